@@ -19,20 +19,15 @@ from omnibot_driver.core.readings import DisplacementReading
 WAG_S, WAG_UNITS = 0.2, 2
 """A small turn that tests the IMU in a drive in which the reported heading is constant.
 
-Only a working IMU reports the turn.
-
-``WAG_S``: time in s for which the heading is constant before this turn.
+``WAG_S``: time in s of constant heading before this turn.
 
 ``WAG_UNITS``: motor units added to the left motor, and subtracted from the right one.
 """
 
 SUPERVISED_S: Final = 1.0
 """Longest time in s in a backward drive (B) without an answer to a change of the motors' units.
-
-After this time, the driver sends ``CS 0 0``, a change of the units by zero. An ``ok`` shows that
-the server still supervises the motion. If the server was restarted, the motors run on without
-supervision.
-"""
+Then ``CS 0 0`` shows whether the server still supervises the motors: a restarted server lets them
+run on."""
 STARTED_M: Final = 0.01
 """Distance in m after which it is certain that the current units are enough to turn the motors."""
 
@@ -85,8 +80,7 @@ class Adjusting(Moves):
     def _predict_turn(self) -> None:
         """Set the ratio of wheel speeds (left / right) from which the robot's turn is computed.
 
-        * Turn on the spot, and backward drive (B) without reported headings: the expected ratio.
-        * All other motions: None; the turn is computed from the reported headings.
+        The ratio is None if the turn is computed from the reported headings.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:

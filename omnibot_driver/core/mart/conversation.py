@@ -39,12 +39,10 @@ LOSS, LOSS_S = 1.5, 0.02
 The new value is ``LOSS * trip_s + LOSS_S`` (s), at most ``delay_s``.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""Times in s that determine whether the network is regarded as disturbed.
+"""Limits in s for a disturbed network, in which a reply may answer an earlier query.
 
-``SLOW_S``: an urgent query (PRESSING) that takes longer is a sign of a disturbance.
-
-``DISTURBED_S``: time after the last sign for which the network is regarded as disturbed. In this
-time, a reply may answer an earlier query.
+* ``SLOW_S``: an urgent query (PRESSING) that takes longer is a sign of a disturbance.
+* ``DISTURBED_S``: duration of the disturbance after the last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Urgent queries. The driver sends an urgent query even while the reply to an earlier query is
@@ -107,12 +105,10 @@ class Conversation(LateReplies):
     """The exchange of requests and replies with one server.
 
     * ``delay_s``: longest time that a datagram may be on its way, in s.
-    * ``discarded``: number of replies that match no pending request. They are late, duplicate or
-      foreign, or they answer a repeated stop.
+    * ``discarded``: number of replies that match no pending request.
     * ``trip_s``: average duration of a query, in s; each unanswered query increases it.
     * ``answered_trip_s``: average duration of answered queries, in s.
-    * ``missed_s``: time in s of the last sign that a reply was lost: the driver gave up an overdue
-      reply, or ended a stop after at least three stop commands.
+    * ``missed_s``: time in s of the last sign that a reply was lost.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -127,10 +123,10 @@ class Conversation(LateReplies):
         self._disturbed_s = self._doubled_s = self.missed_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
-        """Return whether ``word`` may be sent now. Every command waits while a request is pending.
+        """Return whether ``word`` may be sent now.
 
-        A query that is not in PRESSING (the urgent queries) also waits while a late reply to an
-        earlier request could be mistaken for the reply to ``word``.
+        Every command waits while a request is pending. A query that is not urgent (PRESSING) also
+        waits while a late reply could be mistaken for the reply to ``word``.
         """
         if self.pending is not None:
             return False
@@ -224,12 +220,8 @@ class Conversation(LateReplies):
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        ``word``: the command that is pending. The result is True only if three conditions hold:
-
-        * ``word`` is a query.
-        * ``reply`` differs from the last reply to ``word``.
-        * ``reply`` is equal to a reply that has just come to another query, or to a controlled
-          move.
+        ``word``: the command that is pending. An equal reply must just have come to another query
+        or to a controlled move.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

@@ -107,9 +107,8 @@ class CorrectedPose:
     def _end_turn(self, *, may_be_recorded: bool) -> float:
         """End a turn on the spot: correct the heading, and return the correction in rad.
 
-        * Plausible angle from the server, or none: no correction.
-        * Implausible angle: the encoder's angle replaces it, and the difference is added to the
-          uncertainty.
+        If the server's angle is implausible, the encoder's angle replaces it. Otherwise, the
+        correction is 0.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

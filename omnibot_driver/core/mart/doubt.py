@@ -37,19 +37,14 @@ TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 ``TOLD_TURN``: a further error, as a fraction of the angle.
 """
 PIVOT: Final = 0.01
-"""Standard deviation of the distance between the robot's centre and the point about which it turns.
-
-The value is a fraction of the track width. For a turn of less than 1 rad, the driver multiplies the
-standard deviation by the angle in rad.
-"""
+"""Standard deviation of the distance between the robot's centre and the point about which it turns,
+as a fraction of the track width. A turn of less than 1 rad has a proportionally smaller value."""
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
 """Random error of a turn that is computed from the commands, as a fraction of its systematic error.
-
-Both errors are standard deviations. The systematic error has the same sign in all intervals between
-two encoder counts; the random error is independent in each interval.
-"""
+Both are standard deviations. The random error is independent in each interval between encoder
+counts."""
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
 
@@ -87,12 +82,9 @@ class Doubt:
     ) -> None:
         """Extend the covariance by a displacement of ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``heading_rad``: heading before the displacement, in the odometry frame.
-
-        ``bend``: standard deviation of the wheel speed ratio from which the turn was computed; 0 if
-        the turn was measured.
-
-        ``aside_m``: standard deviation of the position across the motion, in m.
+        * ``heading_rad``: heading before the displacement, in the odometry frame.
+        * ``bend``: standard deviation of the wheel speed ratio; 0 if the turn was measured.
+        * ``aside_m``: standard deviation of the position across the motion, in m.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)
@@ -163,9 +155,8 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Replace the heading error of the last turn: the server's record of the turn has arrived.
+        """Replace the last turn's heading error: the server's record has the angle by the gyro.
 
-        The record has the angle by the gyro, so the gyro's error replaces the error of the wheel.
         Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
@@ -173,8 +164,8 @@ class Doubt:
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
         """Return the variances of heading and position that a turn on the spot has caused so far.
 
-        ``spun_rad``: angle of the turn by the encoder of the right-hand wheel. ``told_rad``: angle
-        of the turn that the server reported, or None.
+        ``spun_rad``: angle by the wheel's encoder. ``told_rad``: angle that the server reported, or
+        None.
         """
         variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)
         pivot_m = PIVOT * self.settings.track_m * min(1.0, abs(spun_rad))

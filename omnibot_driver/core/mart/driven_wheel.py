@@ -19,8 +19,7 @@ SLOWEST_MPS: Final = 0.015
 class DrivenWheel:
     """One motor, and the wheel that it turns.
 
-    * ``stood_s``: time in s for which the wheel has not turned, although the motor has enough
-      units.
+    * ``stood_s``: time in s for which the wheel has not turned in spite of enough motor units.
     * ``window_units_s``: sum of units * seconds in the averaging window.
     * ``window_m``: distance in m in the averaging window.
     """
@@ -45,9 +44,7 @@ class DrivenWheel:
         """Return the measured speed minus the expected one, in nominal units.
 
         ``less``: assumed minus real units of the motor, which differ after a lost command.
-        ``seconds``: duration of the averaging window.
-
-        ``per_unit_mps``: speed in m/s that an ideal motor has with one unit.
+        ``per_unit_mps``: speed in m/s of an ideal motor with one unit.
         """
         expected = self.line.speed(self.window_units_s / seconds - less)
         return self.window_m / seconds / per_unit_mps - max(0.0, expected)

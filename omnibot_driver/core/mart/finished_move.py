@@ -13,11 +13,8 @@ from omnibot_driver.core.mart.goal import INCH_M
 from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
-"""Smallest measured distance or turn of a complete move, as a fraction of the target.
-
-A move with a smaller distance or turn is regarded as incomplete. The target is the requested or the
-expected distance or turn, whichever is smaller.
-"""
+"""Smallest measured distance or turn of a complete move, as a fraction of the requested or the
+expected one, whichever is smaller. A move with less is regarded as incomplete."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
@@ -39,17 +36,14 @@ can show that the run was incomplete."""
 class Done:
     """A controlled move that has ended, with its measurements.
 
-    A duplicate of the request may have started a second run of the same move.
-
-    * ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, they
-      are those of the second run alone.
+    * ``way_m``, ``turned_rad``: distance and turn by the encoder. If the move had a second run,
+      they are those of the second run alone.
     * ``lasted_s``: time in s from the request to the reply.
     * ``quiet_s``: longest possible duration of a second run, in s.
     * ``completed``: whether the server reported success, and no stop ended the move.
     * ``expected``: distance in m, or turn in rad, of a complete run, learned from earlier moves.
     * ``stopped_again``: whether the driver has sent a stop after the move, against a second run.
-    * ``slowness``: usual time for a distance or turn, relative to a robot with the default
-      settings.
+    * ``slowness``: usual time for a move, relative to a robot with the default settings.
     * ``gyro_scale``: true turn divided by the turn that the server's gyro measures.
     """
 
@@ -133,8 +127,8 @@ class Done:
     def has_run_twice(self) -> bool:
         """Whether the measurements show that the server has run the move twice.
 
-        True if the server has completed the move, but the encoder has counted too little. The move
-        then ran again, so that the counting began anew, and a stop has cut the second run short.
+        The encoder counts from zero in a second run. So too small a count of a completed move shows
+        a second run that was stopped.
         """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
@@ -143,8 +137,7 @@ class Done:
     def ended_late(self) -> bool:
         """Whether the reply came so late that the server may have run the move twice.
 
-        The server replies at the end of each run. If the first reply is lost, the second one seems
-        to be a late first one.
+        If the reply to the first run is lost, the reply to the second run seems to be late.
         """
         return self.lasted_s >= TWO * self.usual_s
 
@@ -152,8 +145,7 @@ class Done:
     def lags(self) -> bool:
         """Whether an incomplete move went much less far than a move usually goes in this time.
 
-        The cause may be a duplicated request, which makes the server run the move twice. The
-        encoder may then show only the second run.
+        The encoder may then show only the second run of a duplicated request.
         """
         driven_s = self.lasted_s - 2 * SETTLES_S
         least = LEAST_PACE * self.asked * driven_s / (self.usual_s - SETTLES_S)
@@ -163,7 +155,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply answers another request, and the move was still in its first run. If the driver
-        sent a stop after this reply, the stop has therefore ended the first run, not a second run.
+        Such a reply answers another request. A stop after such a reply has ended the first run, not
+        a second one.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -40,11 +40,8 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
-"""Growth of the allowed heading error with each turn since the last straight move.
-
-After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``, so that the robot
-does not turn back and forth.
-"""
+"""Growth of the allowed heading error with each turn since the last straight move, as a fraction of
+NEAR_RAD. This growth keeps the robot from turning back and forth."""
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
 
@@ -139,10 +136,8 @@ class Move:
     def repeated(self) -> "Move":
         """Return the ``Move`` to continue with when the goal ``place`` is commanded again.
 
-        * If the goal is in progress, the drive to it continues.
-        * If the goal has failed, the drive to it begins anew.
-        * If the goal was reached, the robot makes another straight move only if the goal is now
-          more than ENOUGH_M (m) away.
+        A failed goal begins anew. After a reached goal, another straight move is made only if the
+        goal is more than ENOUGH_M (m) away.
         """
         if not self.given_up:
             return self

@@ -40,11 +40,9 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Shortest time in s from the server's first reply after an absence to the start of a motion.
-
-VOLTS and most motion commands crash a server that starts up. If RM (forward drive) crashes the
-server, the motors stay on.
-"""
+"""Shortest time in s from the server's first reply after an absence to the start of a motion. An
+earlier VOLTS or motion can crash the server; after a crash by RM (forward drive), the motors stay
+on."""
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Limit for a silence of the server. After a longer silence, the server is regarded as absent.
 
@@ -67,11 +65,9 @@ silence, the server cannot have been restarted.
 GAP_S, GAP_LONGEST_S = 0.12, 1.0
 """Times in s to detect a restart of the server by a short silence while the robot is at rest.
 
-``GAP_S``: after a silence longer than this time plus twice the average duration of a query, the
-server may have been restarted, so the driver reads the heading. A heading of exactly zero shows a
-restart.
-
-``GAP_LONGEST_S``: longest wait of the driver for this heading, from the end of the silence.
+* ``GAP_S``: silence, besides twice the average duration of a query, after which the driver reads
+  the heading. A heading of exactly zero shows a restart.
+* ``GAP_LONGEST_S``: longest wait for this heading, from the end of the silence.
 """
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
@@ -191,10 +187,9 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Start time of a controlled move that the server runs, or may run a second time.
+        """Start time of a controlled move that the server runs or may run again; None without one.
 
-        A duplicated request causes the second run. The server reports no measurements during a
-        move. The result is None if there is no such move.
+        The server reports no measurements during a move.
         """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
@@ -229,10 +224,10 @@ class Ground:
         return self.heard_s <= self._present_s + most_s
 
     def _hears(self, now: float) -> None:
-        """Record the arrival of a reply. Decide whether the server may have been restarted.
+        """Record the arrival of a reply, and decide whether the server may have been restarted.
 
-        A restart is possible after a long silence. The server may also have been started just now,
-        if a server of another kind gave the last answer to HELLO.
+        A restart is possible after a long silence, and after a HELLO that a server of another kind
+        has answered.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:
@@ -305,11 +300,8 @@ class Ground:
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 
-        After a forward drive (RM), the odometry needs a heading at rest before the first encoder
-        count.
-
-        The wait lasts at most HEADING_S (s), plus HEADING_TRIPS times the duration of a query. If
-        no heading has come by then, the driver logs NO_HEADING once.
+        After a forward drive (RM), the odometry needs a heading at rest first. If no heading comes
+        in time, the driver logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

@@ -61,8 +61,8 @@ class Health:
       heading.
     * ``heading_changes``: number of changes of the reported heading in the current motion.
     * ``reference_fails``: number of starts of RM in a row that have failed.
-    * ``outlived``: whether the server's stop port may still wait for the end of an old motion. The
-      stop of the next motion can then fail.
+    * ``outlived``: whether the server's stop port may still wait for the end of an old motion, so
+      that the next motion's stop can fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -148,8 +148,7 @@ class Health:
     def outlives(self) -> None:
         """Record that the server's stop port may still wait for the end of an old motion.
 
-        The server answered a stop command after the driver had also used the stop port for the same
-        motion. The stop port may hang during the next motion.
+        The server has answered a stop command after the stop port was used for the same motion.
         """
         self.outlived, self._may_be_restarted = True, False
 
@@ -210,8 +209,8 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        If RM (forward drive) has failed in the last STRAYS_S, the driver assumes that RM has
-        started the motors in spite of the failure, and regards the server as defective.
+        If RM (forward drive) has failed in the last STRAYS_S, the server is regarded as defective:
+        the failed RM seems to have started the motors.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 

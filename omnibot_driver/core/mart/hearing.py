@@ -19,11 +19,8 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Limit for a command that changes the motors' units, as a relative change.
-
-In a backward drive (B) without reported headings, the driver computes the robot's turn from the
-units. If the reply to a larger change is missing in such a drive, the driver stops the robot.
-"""
+"""Largest relative change of the motors' units that may stay unanswered while the robot's turn is
+computed from the units. After a larger unanswered change, the driver stops the robot."""
 
 
 class Hearing(Measuring):

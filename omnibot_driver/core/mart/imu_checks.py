@@ -19,14 +19,13 @@ class ImuChecks(FailedStarts):
     """The part of ``Pilot`` that checks the IMU."""
 
     def _check(self, now: float) -> Packets:
-        """Return the request that checks the IMU; no packets while it must wait.
+        """Return the request that checks the IMU; no packets while the check must wait.
 
         Reasons to wait:
 
         * The check is not due.
         * A late reply could be mistaken for the reply to the check.
-        * The server was silent for a short time, and may have been restarted. The driver waits for
-          the next heading, which shows whether the server was restarted.
+        * After a short silence, a heading must first show whether the server was restarted.
         """
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):

@@ -23,11 +23,8 @@ from omnibot_driver.core.mart.words import (
 PROVED_S: Final = 0.2
 """A motion starts only if the last successful check of the IMU is at most this old, in s."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""Usual duration of each check of the IMU, in s.
-
-If a check takes longer, the driver assumes that the network has delayed the request and the reply
-equally. The age of the result is then the delay of the reply.
-"""
+"""Usual duration of each check of the IMU, in s. Half of any excess is regarded as the delay of the
+reply, and so as the age of the result."""
 EARLY: Final = 4
 """Number of failed checks of the IMU in a row after which the driver tells the user that the server
 answers too fast. Each of these checks gets only a reply that comes too early."""
@@ -39,10 +36,7 @@ REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
 class ImuProof:
     """The results of the last checks of the IMU.
 
-    ``word``: the command that checks the IMU of this server.
-
-    ``dead``: whether the last checks found no working IMU.
-
+    ``word``: the command for the check. ``dead``: whether the last checks found no working IMU.
     ``transit_s``: how much longer than usual the last successful check took, in s.
     """
 
@@ -98,10 +92,8 @@ class ImuProof:
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
         """Evaluate the reply to a check; return False if the caller must evaluate it.
 
-        This method evaluates successes and two failures: the IMU is dead, or the server does not
-        know RST IMU. The caller must evaluate all other failures.
-
-        ``took_s``: time from the check to the reply, in s.
+        This method evaluates successes, a dead IMU, and a server that does not know RST IMU.
+        ``took_s``: time in s from check to reply.
         """
         if isinstance(reply, Ok):
             self.dead, self._fails = False, 0

@@ -26,10 +26,9 @@ If all bytes of the file have arrived, the driver waits for only a third of this
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn, while the robot is at rest.
 
-``RECORD_S``: wait for the reply to the request. The driver adds three average durations of a query
-to this time.
+``RECORD_S``: for the reply to the request, plus three average durations of a query.
 
-``RECORD_QUIET_S``: wait for each further piece of the file.
+``RECORD_QUIET_S``: for each further piece of the file.
 """
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a job, if the job is in
@@ -143,13 +142,10 @@ class Jobs:
         return since if file is None else f"{since}, {file.came} of {file.size} bytes"
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin a job.
+        """Begin a job, which replaces a job that the driver itself began and has not sent yet.
 
-        If the driver itself began the current job, and has not sent the request of the current job
-        yet, the new job replaces the current one.
-
-        Raises RequestRefused if another job is in progress, or if the new job is to download the
-        log and the server may have no log.
+        Raises RequestRefused if another job is in progress, or for a log that the server may not
+        have.
         """
         if self.job in OWN and not self._waiting:
             self._clear()
@@ -256,10 +252,10 @@ class Jobs:
             )
 
     def cancel(self, why: str) -> None:
-        """End the job as failed. ``why``: the reason, and after a semicolon what to do.
+        """End the job as failed.
 
-        A job that the driver itself began ends without a result. If the job has ended the server by
-        EXIT, the user gets other advice: to copy the file from the controller.
+        ``why``: the reason, and after a semicolon what to do. A job that the driver itself began
+        ends without a result.
         """
         if self.job in OWN:
             self._clear()

@@ -44,10 +44,9 @@ class LateReplies:
         self._answers[word] = reply, now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record that ``reply`` is the late reply to an earlier request.
+        """Record a late ``reply`` to an earlier request; the driver expects no other of its form.
 
-        The driver then expects no other late reply of the same form. But if an identical reply has
-        come within the last ``delay_s``, ``reply`` may be a copy of that reply, and nothing
+        But if an equal reply came within the last ``delay_s``, ``reply`` may be a copy, and nothing
         changes.
         """
         if not self._has_come(reply, now):
@@ -84,8 +83,7 @@ class LateReplies:
     def _owes_until(self, word: Word, sent_s: float) -> None:
         """Record that the reply to a request may still come.
 
-        ``word``: the command of the request. ``sent_s``: time at which the request was sent. The
-        reply is expected within the longest duration of the command plus twice ``delay_s``.
+        ``word``: the command of the request. ``sent_s``: time at which the request was sent.
         """
         until_s = sent_s + word.takes_s + 2 * self.delay_s
         for form in word.forms:

@@ -22,12 +22,9 @@ STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S, ROLLS_LONG_S = 0.3, 0.6, 1.2
 """Times in s for which a robot may coast after the end of a motion.
 
-``ROLLS_S``: after a stop.
-
-``ROLLS_AFTER_MOVE_S``: after a controlled move. The reply to a failed move comes while the robot
-still coasts.
-
-``ROLLS_LONG_S``: after a reply which says that the wheels did not stop in time.
+* ``ROLLS_S``: after a stop.
+* ``ROLLS_AFTER_MOVE_S``: after a controlled move. A failed move ends while the robot coasts.
+* ``ROLLS_LONG_S``: after a reply which says that the wheels did not stop in time.
 """
 
 

@@ -35,8 +35,8 @@ It is NOISE, plus NOISE_PART times the commanded units.
 class MotorLine:
     """A motor's speed as a linear function of its motor units: ``slope * units + offset``.
 
-    A Kalman filter learns slope and offset. Speed and offset are in nominal units: at 10 motor
-    units, an ideal motor has the speed 10. The argument ``slope`` is the initial slope.
+    A Kalman filter learns slope and offset, in nominal units. The argument ``slope`` is the initial
+    slope.
     """
 
     def __init__(self, slope: float = 1.0) -> None:
@@ -85,8 +85,8 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add ``slope`` and ``offset`` to the learned slope and the learned offset.
 
-        The caller uses this method for a motor that was not measured by itself. The arguments are
-        then the changes that a measurement has made to the other motor's slope and offset.
+        Use this method for a motor that was not measured. The arguments are then the changes of the
+        other motor's line.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

@@ -22,11 +22,8 @@ MOST_UNEQUAL: Final = 2 * UNEQUAL
 """Largest difference between the assumed ratio of the motors' speeds and ``motor_balance``."""
 Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
-"""Smallest number of motor units for which the ratio of the two motors' speeds is computed.
-
-For fewer units, the driver uses the ratio at ``BALANCE_UNITS``: a ratio that is computed for fewer
-units would be less exact.
-"""
+"""Smallest number of motor units for which the ratio of the two motors' speeds is computed. For
+fewer units, the ratio at ``BALANCE_UNITS`` is more exact."""
 
 
 class Motors:
@@ -68,9 +65,8 @@ class Motors:
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the motor units for a turn at ``rate_radps``, corrected by the measured rate.
 
-        ``units``, ``seen_radps``: the units of both motors, and the rate measured with them, in the
-        present turn on the spot. This measurement affects only the result: the driver does not
-        learn from it.
+        ``seen_radps``: rate measured with ``units`` in the present turn. The driver does not learn
+        from this measurement.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))

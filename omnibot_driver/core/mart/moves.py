@@ -128,10 +128,8 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a straight move, the driver learns at once from the wheel. After a turn, the driver
-        downloads the server's record of the turn, and learns when the download has ended. In three
-        cases, the driver learns at once from the wheel after a turn too: the network is bad, no
-        more records are needed, or another job is in progress.
+        After a turn, the driver first downloads the server's record if possible. Otherwise, the
+        driver learns at once from the wheel.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -237,10 +235,8 @@ class Moves(Asking):
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
         """Return whether the driver may have stopped a second run of a controlled move.
 
-        The result is False in two cases:
-
-        * The driver has sent no stop after the move.
-        * The move was complete, and the server answered too soon for a second run.
+        The result is False if no stop was sent, or if a complete move left no time for a second
+        run.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

@@ -42,16 +42,13 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
-"""Longest delay of the voltage query (VOLTS) by unanswered requests, in s after the last VOLTS.
-
-In the first STARTS_UP_S (s) after a motion, unanswered requests can always delay VOLTS, because the
-driver sends no VOLTS during a turn on the spot.
-"""
+"""Longest delay of the voltage query (VOLTS) by unanswered requests, in s after the last VOLTS. In
+the first STARTS_UP_S (s) after a motion, the delay may be longer."""
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
 
-* ``SILENT_S``: since the last reply; twice the average duration of a query is added.
-* ``SILENT_AFTER_MOVE_S``: the same, if a duplicate of a move may be running; nothing is added.
+* ``SILENT_S``: since the last reply, in addition to twice the average duration of a query.
+* ``SILENT_AFTER_MOVE_S``: since the last reply, if a duplicate of a move may be running.
 * ``GREET_AGAIN_S``: since the last HELLO.
 """
 COMMANDED: Final = "a motion command or a stop arrived; stop sending commands, then call again"
@@ -69,8 +66,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Make ``wanted`` the motion, goal or stop that the robot must carry out from now on.
 
-        A motion command or a stop cancels the current job. But a repetition of the present goal
-        does not cancel the download of a turn's record.
+        A command or stop cancels the current job. Only a repetition of the present goal lets the
+        download of a turn's record continue.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -104,8 +101,8 @@ class Pilot(Hearing):
     def busy(self, now: float) -> bool:
         """Return whether the driver expects the server to be silent, because the server is busy.
 
-        The result is False if the server may be lost: before the driver began to stop a motion, the
-        server was silent for too long (``_absent_s``). Silence in a controlled move is normal.
+        The result is False if the server may be lost: it was silent for too long (``_absent_s``)
+        before a stop.
         """
         if (stopping := self._stopping) is not None:
             silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s
@@ -229,9 +226,8 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        The server executes a duplicate before it answers a later query. So a duplicate is excluded
-        by an encoder count that the server measured after the end of the move, or by the answer to
-        a HELLO that the driver sent after the start of the move.
+        An encoder count after the move, or the answer to a HELLO sent after its start, excludes a
+        duplicate: the server executes a duplicate before it answers.
         """
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free
@@ -240,8 +236,8 @@ class Pilot(Hearing):
     def _copy_stop_s(self) -> float:
         """Time at which to stop a suspected duplicate of a move; infinity without one.
 
-        It is also infinity in every state except STILL: in a forward or backward drive, the stop
-        commands SL and SS may hang the server.
+        The time is infinite in every state except STILL: in a drive, the stop commands SL and SS
+        may hang the server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf

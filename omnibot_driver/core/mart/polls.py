@@ -25,12 +25,8 @@ STILL: Final[Mapping[Word, float]] = {
 }
 DRIVING: Final[Mapping[Word, float]] = {RMRA: MOTION_S, ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
 TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, RMRA: 0.15, MCSTAT: 0.5}
-"""Periods in s of the queries in a turn on the spot.
-
-A turn does not need the voltage query VOLTS, so the driver does not send it. VOLTS would crash a
-server that is starting up, and the replies in a turn do not show whether the server has just
-restarted.
-"""
+"""Periods in s of the queries in a turn on the spot. The voltage query VOLTS is left out: it would
+crash a server that has just restarted, and a turn does not show a restart."""
 PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.STILL: STILL,
     State.DRIVING: DRIVING,
@@ -61,9 +57,8 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        The most urgent query has the smallest sum of due time and period. While a rare query
-        waits, its sum stays the same, and the sums of frequent queries grow. So frequent queries
-        cannot delay a rare query for ever.
+        The order is that of due time plus period, so that frequent queries cannot delay a rare
+        query for ever.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]

@@ -44,8 +44,9 @@ FRESH_S: Final = 0.2
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
 """Assumptions about the end of a forward drive (RM), if no heading has come after the stop.
 
-``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate of the robot
-since the last heading, in rad/s. ``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
+* ``ROLLS_S``: time in s for which the robot coasts.
+* ``MOST_RADPS``: largest turn rate since the last heading, in rad/s.
+* ``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
 """
 
 
@@ -138,12 +139,10 @@ class Reckoning(CorrectedPose):
         self.stands, self._stood_s = True, now
 
     def rest(self, longest: float = math.inf) -> float:
-        """End the motion. Call this after its last encoder count, which includes the coasting.
+        """End the motion, and return the correction of the heading in rad.
 
-        If the server has reported an implausible angle of a turn, return the angle by the encoder
-        minus the angle by the server, in rad. Otherwise, return 0.
-
-        ``longest``: longest possible distance of a straight move in m, or largest turn in rad.
+        Call this after the last encoder count, which includes the coasting. ``longest``: longest
+        possible straight move in m, or largest turn in rad.
         """
         wrong_rad = 0.0
         if self.motion is Motion.NONE:
@@ -245,9 +244,7 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        Both values are zero, except while the network may have lost the start command. In this
-        time, the last encoder count may be older than the motion, so the pose does not include the
-        count. The result is the motion that the count shows if the count is not older.
+        Both values are zero, except while the last encoder count may be older than the motion.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -323,8 +320,8 @@ class Reckoning(CorrectedPose):
     def stale(self, now: float) -> tuple[float, float]:
         """Return for how many s the turn rate has been out of date, and the resulting error.
 
-        The rate is out of date if the last heading is older than FRESH_S. The error is the
-        heading's standard deviation in rad. Both values are 0 except in a forward drive (RM).
+        The error is the heading's standard deviation in rad. Both values are 0 except in a forward
+        drive (RM).
         """
         stale_s = max(0.0, now - max(self.heading.told_s, self._began_s) - FRESH_S)
         if self.motion is not Motion.REFERENCE:

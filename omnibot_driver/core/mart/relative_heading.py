@@ -21,11 +21,8 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 rad/s.
 """
 OLD_RAD: Final = 0.01
-"""Largest difference in rad between two headings that are regarded as the same heading.
-
-A forward drive (RM) begins at the heading zero. If the heading after its start command is the same
-as before, it may be from a late reply, or the start command may be lost.
-"""
+"""Largest difference in rad between two headings that are regarded as the same. The same heading
+before and after RM (forward drive) may come from a late reply or a lost RM."""
 MOST_RAD: Final = 1e7
 """Limit in rad. A reported heading of this size or more is rejected.
 
@@ -43,8 +40,7 @@ class RelativeHeading:
     """The relative heading within a motion.
 
     * ``told_s``: time of the last accepted heading.
-    * ``from_s``: earliest time at which the server can have measured the last certain heading. A
-      changed heading is uncertain if its reply may answer an earlier query (RMRA).
+    * ``from_s``: earliest time at which the server can have measured the last certain heading.
     * ``changed_s``: time of the last change of heading.
     * ``same``: number of equal headings since the last change.
     """
@@ -106,10 +102,8 @@ class RelativeHeading:
     def tell(self, angle_rad: float, when: Moment, stood_s: float, scale: float = 1.0) -> bool:
         """Process a reported heading; return whether it is plausible and has changed.
 
-        ``stood_s``: time at which the robot was stopped, infinite while it is driven.
-
-        ``scale``: true turn to the left divided by the change of the reported heading. The
-        scale may change during a motion. Such a change is not regarded as a turn.
+        ``stood_s``: time at which the robot was stopped, or infinity. ``scale``: true turn to the
+        left divided by the change of the reported heading.
         """
         if not abs(angle_rad) < MOST_RAD:
             self.forget()
@@ -155,14 +149,8 @@ class RelativeHeading:
     def doubt_rad(self, angle_rad: float, at_s: float) -> float:
         """Return the standard deviation, in rad, of the turn since the last heading.
 
-        The result is zero if the server cannot have restarted. A server that has restarted reports
-        a heading of zero or, on some servers, the turn since the restart. So if the server may have
-        restarted, the new heading ``angle_rad`` decides:
-
-        * The heading certainly has a new zero point: the result is infinite.
-        * The heading has changed, and is near zero, so that its zero point may be new: the result
-          is the size of the last heading plus the turn that is expected since then.
-        * In all other cases, the zero point is the old one, and the result is zero.
+        The result is 0 if ``angle_rad`` certainly has the old zero point, and infinite if a restart
+        of the server certainly gave a new one.
         """
         before_rad = self._angle_rad
         if not self.may_begin_anew or before_rad is None or at_s <= self.told_s:
@@ -171,6 +159,8 @@ class RelativeHeading:
             return math.inf
         most_rad = abs(self.rate_radps) * (at_s - self.told_s)
         same = angle_rad and abs(angle_rad - before_rad) < OLD_RAD
+        # A heading near zero may have a new zero point. The turn may then be as large as the last
+        # heading plus the turn that is expected since then.
         return 0.0 if same or abs(angle_rad) > most_rad + DOUBT_RAD else abs(before_rad) + most_rad
 
     def _take(self, angle_rad: float, when: Moment) -> None:

@@ -18,11 +18,9 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Largest difference between commanded and final yaw rate with which a turn on the spot begins.
-
-The value is a fraction of the final yaw rate. The server cannot change the rate of a turn, so the
-driver waits until a ramp has brought the commanded yaw rate this near to the final one.
-"""
+"""Largest difference between commanded and final yaw rate with which a turn on the spot begins, as
+a fraction of the final rate. The server cannot change a turn's rate, so the driver waits for the
+ramp."""
 
 
 def is_standstill(wanted: Wanted) -> bool:

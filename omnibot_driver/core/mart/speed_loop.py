@@ -22,11 +22,8 @@ The limit is small, because the network may duplicate a command. The server then
 twice.
 """
 MOST_BACKWARD: Final = 5
-"""Largest change of a motor's units by one command in a backward drive on a slow network.
-
-In all other drives, the limit is MOST_CHANGE. In a backward drive on a slow network, the driver
-does not notice that a command arrives twice.
-"""
+"""Largest change of a motor's units by one command in a backward drive on a slow network. In such a
+drive, the driver does not notice that a command arrives twice."""
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
 
@@ -41,13 +38,10 @@ MOST_MISSED: Final = 4
 From the measured speeds, the driver finds out which of these changes have arrived at the server.
 """
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""How the driver learns about the motors if exchanges with the server are slow. An exchange takes
-``trip_s`` on average (s).
+"""How the driver learns about the motors if an exchange with the server takes ``trip_s`` (s).
 
-``LEARN_TRIPS``: the averaging window lasts at least ``LEARN_S + LEARN_TRIPS * trip_s``.
-
-``LESS_PER_S``: the standard deviation of a measured speed is multiplied by
-``1 + LESS_PER_S * trip_s``.
+* The averaging window lasts at least ``LEARN_S + LEARN_TRIPS * trip_s``.
+* The standard deviation of a measured speed is multiplied by ``1 + LESS_PER_S * trip_s``.
 """
 SLOWEST_START_MPS: Final = 0.03
 """Lowest wheel speed in m/s with which the driver starts RM (forward).
@@ -66,13 +60,13 @@ HOLD_AFTER_S: Final = 1.0
 integrate the heading error."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""How uncertain the ratio of the wheel speeds becomes if the server may have missed a new set-point
-of the motors, or carried it out twice. ``COPIED`` or ``MISSED``, times the squared relative change
-of the set-point, is added to the relative variance of the ratio.
+"""Factors for the growth of the relative variance of the wheel speeds' ratio.
 
-* ``COPIED``: for a set-point that may arrive twice, because the network is slow.
-* ``MISSED``: for a set-point that the server did not answer.
-* ``SLOW_TRIP_S``: average duration of an exchange, in s, above which the network is slow.
+Each new set-point adds a factor times the squared relative change of the set-point:
+
+* ``COPIED``: if the set-point may arrive twice, because an exchange takes more than ``SLOW_TRIP_S``
+  (s) on average.
+* ``MISSED``: if the server did not answer the set-point.
 """
 
 
@@ -127,13 +121,8 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that neither motor turns, because the present motor units are too few.
 
-        ``units``: the units of both motors; None if each motor has the units that were last
-        commanded.
-
-        If a motor has MOST_DEAD units or more, something blocks the motor, and the driver learns
-        nothing from it. Otherwise, the driver corrects the motor's MotorLine, and raises the units
-        of the next start. If ``units`` is None, a MotorLine by which the motor certainly turns
-        (``MotorLine.turns``) stays unchanged.
+        ``units``: the units of both motors; None for those last commanded. A motor with MOST_DEAD
+        units or more is regarded as blocked.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -196,10 +185,8 @@ class SpeedLoop(Motors):
     ) -> None:
         """Use a displacement, measured over ``seconds``, to learn how fast the motors turn.
 
-        The displacement also updates the heading error.
-
-        ``right_only``: whether only the right wheel was measured. If so, the right motor's changes
-        of slope and offset (``MotorLine``) are also applied to the left motor.
+        ``right_only``: whether only the right wheel was measured. The left motor's line then
+        changes like that of the right motor.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

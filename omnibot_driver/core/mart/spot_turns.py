@@ -22,52 +22,39 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: in the first EARLY_S (s) of a steady rate, if the driver has not learned from a turn yet.
-
-``OFF_AGAIN``: at all other times. It is larger, because a new start disturbs the motion.
+* ``OFF``: in the first EARLY_S (s) of a steady rate, until the driver has learned from a turn.
+* ``OFF_AGAIN``: at all other times. A new start disturbs the motion.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for learning from slow turns, as fractions of the commanded rate.
 
-``LEAST_LESSON``: lowest rate that the driver learns. If the measured rate of the first turn is
-lower, the driver learns this limit instead.
-
-``HELD``: lowest measured rate of a later turn from which the driver learns. In a slower turn,
-something holds the robot.
+* ``LEAST_LESSON``: lowest rate that the driver learns. It replaces a lower measured rate.
+* ``HELD``: lowest measured rate of a later turn. In a slower turn, something holds the robot.
 """
 EVEN: Final = 0.15
 """Relative change of the rate during a turn, below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Limits of a turn's measured rate, as fractions of its commanded rate.
-
-The driver learns from a turn that is slower than HINDERED. If the next turn is faster than
-TOO_FAST, something held the robot in the slow turn, and the driver undoes what it learned from the
-slow turn.
-"""
+"""Limits of a turn's measured rate, as fractions of its commanded rate. If a turn above TOO_FAST
+follows one below HINDERED, the driver undoes what it learned from the slow turn."""
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
 
-``SAME``: largest relative difference of two commanded rates that are still regarded as equal.
-
-``CORRECTIONS``: largest number of corrections while the commanded rate stays the same.
+``SAME``: largest relative difference of two commanded rates that are regarded as equal.
+``CORRECTIONS``: largest number of corrections for equal rates.
 """
 STEADY: Final = 0.03
 """Relative change of the commanded rate above which it is regarded as a new rate."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-* ``SPINS_UP_S``: least time in s from the start of the turn to the window in which the rate is
-  averaged.
+* ``SPINS_UP_S``: least time in s from the turn's start to the averaging window.
 * ``SEEN_RAD``: least angle of the turn, in rad.
 * ``TOLD_RAD``: angle in rad above which the server's angle is used instead of the wheel's.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Terms of the largest plausible error of the angle in the reply to a stop command.
-
-This error is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two
-queries. If the angle differs more from the expected turn, the number in the reply may be an encoder
-count instead of an angle.
-"""
+"""Terms of the largest plausible error of the angle in the reply to a stop command: UNSURE_RAD
+(rad), and UNSURE_PART times the expected turn. A larger error means that the number may be an
+encoder count."""
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.
 """
@@ -86,8 +73,6 @@ class SpotTurns:
     * ``units``: motor units of the last turn, or those that SSP (the command for the speed of
       turns) has set for the next turn; 0 at the beginning of a connection.
     * ``seen_radps``: measured rate of the last turn, in rad/s.
-    * ``settings``: sizes and scales of the robot. The driver assigns new ones when a parameter
-      changes.
     """
 
     def __init__(self, settings: MartSettings, odometry: MartOdometry, loop: SpeedLoop) -> None:
@@ -119,9 +104,8 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        The caller must send SSP before the check of the IMU that precedes each turn.
-
-        ``delay_s``: time in s after which no copy of an earlier SSP can arrive.
+        Send SSP before the turn's check of the IMU. ``delay_s``: longest delay in s of an earlier
+        SSP's copy.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -213,8 +197,7 @@ class SpotTurns:
     def _lesson(self, seen_radps: float) -> float:
         """Return the magnitude of the turn rate that the driver learns from a turn, in rad/s.
 
-        The driver learns the measured rate ``seen_radps``. If the measured rate is lower than
-        LEAST_LESSON times the commanded rate, the driver learns this limit instead.
+        The rate is ``seen_radps``, but at least LEAST_LESSON times the commanded rate.
         """
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
@@ -222,8 +205,6 @@ class SpotTurns:
         """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
         ``unseen_s``: time in s from the last encoder count to the first stop command.
-
-        ``trip_s``: average duration of a query, in s.
         """
         if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:
             return False
@@ -242,8 +223,7 @@ class SpotTurns:
         * ``degrees``: angle in the reply to the stop command; None if there was no angle.
         * ``uncounted_s``: time in s from the last encoder count to the first stop command.
         * ``turned_s``: time in s since the turn began.
-        * ``disturbed``: whether the network is disturbed, so that nothing is learned from this
-          turn.
+        * ``disturbed``: whether the network is disturbed, so that nothing is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
@@ -272,11 +252,8 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Undo what was learned from a slow turn if the next turn is fast.
 
-        A fast turn shows that something has held the robot in the slow turn. Call this method each
-        time before the driver learns from a turn. After a slow turn, the method stores what the
-        driver knows, so that the next call can restore it.
-
-        ``part``: the turn's measured rate divided by its commanded rate.
+        Call this each time before the driver learns from a turn. ``part``: the turn's measured rate
+        divided by its commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
             # otherwise the driver would learn from both turns a dead zone that does not exist
