@@ -34,9 +34,7 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 NAME_WAIT_S: Final = 2.0
 """Longest time in s for which a controlled move waits until all earlier HELLOs have arrived.
 
-After a move, an answer to HELLO proves that no duplicate of the move is running, but not if the
-HELLO was sent before the move. If the wait reaches the limit, the driver sends the move
-nevertheless, and does not use answers to HELLO as a proof.
+After this time, the driver sends the move, but does not use answers to HELLO as a proof.
 """
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""
@@ -106,13 +104,13 @@ class Starts(ImuChecks):
     def _switch_motors_off(self, now: float) -> Packets:
         """Return the next request that switches off the motors; no packets while it must wait.
 
-        MCS stops both motors; MSM ends the effect of MCS. Each of these requests waits until no
-        late reply can be mistaken for the reply to it. MSM also waits until no duplicate of MCS can
-        arrive after MSM.
+        MCS stops both motors; MSM ends the effect of MCS.
         """
         request = self._switch_off.next()
+        # before this time, a late reply could be mistaken for the reply to this request
         certain_s = self.conversation.certain_from_s(request.word)
         if request is RELEASE:
+            # before this time, a duplicate of MCS could arrive after MSM
             certain_s = max(certain_s, self._harmful_s + self._delay_s)
         if now < certain_s:
             return NO_PACKETS
@@ -131,13 +129,11 @@ class Starts(ImuChecks):
         return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
-        """Return whether the command ``start`` must wait, because a HELLO may still be on its way.
+        """Return whether ``start`` must wait, because a HELLO may still be on its way.
 
-        Only a controlled move waits, for at most ``NAME_WAIT_S``. After the move, the driver takes
-        an answer to HELLO as proof that no duplicate of the move is running. The answer to a HELLO
-        from before the move would be a false proof. After a fresh check of the IMU, the move does
-        not wait, because the driver has already waited before the check.
+        Only a controlled move waits, for at most ``NAME_WAIT_S``.
         """
+        # if the check of the IMU is fresh, the driver has already waited before the check
         if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
             return False
         if now >= self._greeted_s + self._delay_s:
@@ -171,6 +167,8 @@ class Starts(ImuChecks):
         self.state, self.motion = State.STARTING, STARTS[start.word]
         self._recorded, self._port_is_free = None, False
         self._port_free_s, self._start_owed_until_s = math.inf, -math.inf
+        # an answer to a HELLO from before the move does not prove that no duplicate of the move is
+        # running
         self._greeted_before = now < self._greeted_s + self._delay_s
         self._start, self._refused, self._runs_on = start.word, False, False
         self._name_awaited_s = math.inf

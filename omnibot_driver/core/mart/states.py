@@ -143,12 +143,12 @@ STARTS: Final[Mapping[Word, Motion]] = {
 }
 """The motion that each start command begins."""
 
+# before the failure of MCR or MCL, some servers turn the robot for 0.5 s
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server does not answer most of these commands: it starts the motors, or waits.
-Only the controlled turns MCR and MCL are answered, by a failure. Before this answer, some servers
-turn the robot for 0.5 s.
+With a dead IMU, the server may start the motors, or wait, without an answer. Only the controlled
+turns (MCR, MCL) are answered, by a failure.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})

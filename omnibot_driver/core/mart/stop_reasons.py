@@ -21,14 +21,11 @@ BLIND_S, TRIPS = 0.8, 5
 This time is BLIND_S (s), plus TRIPS times the average duration of an exchange.
 """
 FROZEN_S, FROZEN_TIMES = 0.5, 3
-"""Limits for a heading that stays constant. The driver stops the robot when both limits are
-reached, because the IMU may be dead, or the robot stuck.
+"""Limits for a constant heading. If both are reached, the driver stops the robot.
 
-``FROZEN_S``: limit, in s, of the time for which the heading is constant. Twice the average duration
-of a query is added to it.
+``FROZEN_S``: time in s, in addition to twice the average duration of a query.
 
-``FROZEN_TIMES``: limit of the number of replies with the same heading. On a slow network, only few
-replies come within the time limit, and they may be equal by chance.
+``FROZEN_TIMES``: number of replies with the same heading.
 """
 NO_START_S: Final = 1.5
 """Longest allowed time in s from the start of a motion until the robot moves."""
@@ -49,11 +46,9 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel, which has no encoder, may turn unseen.
 
-``STUCK_S``: for a robot that is stopped because it does not seem to move. If only the right wheel
-is stuck, the left wheel may have turned for this time.
+``STUCK_S``: if the robot is stopped because it does not seem to move.
 
-``COASTS_S``: for a robot that is stopped because a wheel is blocked. The encoder shows that the
-right wheel is at rest, but the left wheel may still coast for this time.
+``COASTS_S``: if the robot is stopped because a wheel is blocked.
 """
 
 
@@ -109,6 +104,7 @@ class StopReasons(Ground):
         if self.state is State.DRIVING and self.loop.blocked_s > BLOCKED_S:
             return HALF_STUCK
         longest_s = FROZEN_S + 2 * self.conversation.trip_s
+        # on a slow network, few replies come within this time, and they may be equal by chance
         frozen = odometry.heading.same >= FROZEN_TIMES and self._frozen_s > longest_s
         if self._heading_is_told and frozen:
             if self.motion is not Motion.SPIN and abs(odometry.speeds.means[0]) < CREEP_MPS:

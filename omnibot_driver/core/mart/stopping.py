@@ -47,27 +47,21 @@ SLOW_STOP: Final = (
     " driver continues"
 )
 NO_START_S: Final = 0.75
-"""Limit in s of the time from the start of a controlled turn (MCR, MCL) to the server's reply. A
-later reply proves that a wheel has turned.
+"""Time in s after which the reply to a controlled turn (MCR, MCL) proves that a wheel has turned.
 
-If no wheel turns, the server gives up and replies 0.6 s after the start. If a wheel turns, the
-server waits 0.75 s for the robot to stop, and replies after this wait.
+If no wheel turns, the server replies 0.6 s after the start; otherwise, after more than 0.75 s.
 """
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
     """Return whether a motion failed only because the wheels did not stop in time.
 
-    The motors are off after this failure. The server reports the failure in two ways:
-
-    * The reply says that the stop has timed out (``SLOW_STOPS``).
-    * The reply to a controlled turn says wrongly that the turn has not begun (``NO_START``). If
-      this reply comes later than ``NO_START_S`` after the start, the turn has certainly begun.
-
-    ``lasted_s``: time from the start of the motion to the reply, without the transit times.
+    The motors are off after this failure. ``lasted_s``: time from the start of the motion to the
+    reply, without the transit times.
     """
     if not isinstance(reply, Fail):
         return False
+    # the reply NO_START to a turn that has certainly begun is wrong: the turn did not stop in time
     turned = motion is Motion.TURN and lasted_s > NO_START_S
     return reply.reason in SLOW_STOPS or (turned and reply.reason == NO_START)
 
@@ -75,21 +69,13 @@ def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
 class Stopping:
     """The stop of one motion.
 
-    ``began_s``: time of the first stop command.
-
-    ``owed``: number of earlier requests that are unanswered. A late reply to one of them would look
-    like a reply to a stop command.
-
-    ``move``: the controlled move to stop; None for another motion. The server's reply to the move
-    ends the stop.
-
-    ``planned``: whether the motion is stopped without a fault, only because another motion or a
-    standstill is wanted.
-
-    ``rounds``: number of times that the driver has sent the stop to the command port.
-
-    ``strange``: a text for the user: the last failure that is unusual as a reply to a stop, or else
-    the first reply that no motion is in progress. Empty if there is neither.
+    * ``began_s``: time of the first stop command.
+    * ``owed``: number of unanswered earlier requests. A late reply to one of them would look like a
+      reply to a stop command.
+    * ``move``: the controlled move to stop, whose reply ends the stop; None for another motion.
+    * ``planned``: whether the motion is stopped without a fault.
+    * ``rounds``: number of times that the driver has sent the stop to the command port.
+    * ``strange``: the last unexpected reply to a stop, as a text for the user; empty without one.
     """
 
     def __init__(
@@ -149,8 +135,7 @@ class Stopping:
     def asks_name(self, now: float) -> bool:
         """Return whether to send HELLO together with the stop of a controlled move.
 
-        The reply to the move may be lost. The server answers HELLO only after the end of the move,
-        so this answer shows that the move has ended.
+        The answer proves that the move has ended, even if the reply to the move is lost.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 
@@ -200,10 +185,8 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
-        Each of the ``owed`` unanswered earlier requests may have caused one doubtful reply. If
-        there are no further doubtful replies, the value is None. Otherwise, the value is the last
-        doubtful reply whose number is plausible for a reply to the stop command. If no number is
-        plausible, the value is the last doubtful reply.
+        The last one with a plausible number is preferred. None if earlier requests may have caused
+        all doubtful replies.
         """
         if len(self._doubtful) <= self._owed:
             return None

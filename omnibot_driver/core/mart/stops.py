@@ -45,13 +45,13 @@ class Stops(StopReasons, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the user's command, except if this kind of motion is blocked: the driver refuses a blocked
-        motion until the command ends.
+        ``why``: the fault, for a notice; empty without a fault. A fault also discards the user's
+        command, unless this motion is blocked.
 
-        ``arrived``: whether it is certain that the server received the start of the motion.
+        ``arrived``: whether the server has certainly received the start.
         """
         if why:
+            # a blocked motion is refused until its command ends
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
             self._turns.forget_setting()
         if self.jobs.moving:
@@ -190,20 +190,19 @@ class Stops(StopReasons, ABC):
     def _outlives(self, reply: Reply, now: float) -> None:
         """Detect whether the server's stop port still waits for the end of an old motion.
 
-        The driver uses the stop port as the last resort, when the server does not answer stops. If
-        the server later answers ``ok`` to a stop, it was not restarted, so its stop port still
-        waits. The port could mistake the start of the next forward drive (RM) for the end of the
-        old motion. Nothing would then stop this drive; see docs/internals/mart_protocol.md.
-
-        A reply with a number is ignored. It answers an earlier query, or the stop command of a turn
-        on the spot, which leaves the stop port free.
+        The next forward drive (RM) could then be impossible to stop; see
+        docs/internals/mart_protocol.md.
         """
+        # the stop command of a turn on the spot leaves the stop port free
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return
         network = self.conversation
         asked = network.pending is not None or now < network.late_until_s(Form.NOTHING)
         if self.state is State.ASKING and asked:
             return  # maybe the reply to RST IMU or MSM
+        # ``ok`` to a stop: the server was not restarted, so its stop port still waits, and could
+        # mistake the start of RM for the end of the old motion (a number would answer an earlier
+        # query)
         if reply.form is Form.NOTHING and reply.form in ANSWERS.get(self.motion, ()):
             self.health.outlives()
 

@@ -19,10 +19,8 @@ NO_CORRECTION: Final = 0.0
 class TurnAngle:
     """The angle of the current turn on the spot, or of the last one.
 
-    Some methods return a correction in rad, which the caller adds to the heading of the pose.
-
-    ``spun_rad``: the turn that the wheel has measured. When ``record`` accepts a recorded angle,
-    ``spun_rad`` becomes this angle.
+    ``spun_rad``: the turn that the wheel has measured, or the recorded angle that ``record`` has
+    accepted. Corrections of the heading are in rad.
     """
 
     def __init__(self) -> None:
@@ -44,8 +42,7 @@ class TurnAngle:
     def add(self, turn_rad: float) -> float:
         """Add a turn measured at the wheel; return the angle that the caller adds to the heading.
 
-        If the server has already reported the angle of the whole turn, the heading already contains
-        this angle. The result is then zero.
+        The result is zero if the heading already contains the server's angle of the whole turn.
         """
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0
@@ -61,9 +58,7 @@ class TurnAngle:
     def end(self, *, may_be_recorded: bool) -> float:
         """End the turn after its last encoder count; return the correction of the heading.
 
-        A correction is necessary only if the server has reported an implausible angle. The wheel's
-        measurement then replaces the reported angle.
-
+        If the server's angle was implausible, the wheel's measurement replaces it.
         ``may_be_recorded``: whether the server may have recorded the turn.
         """
         self._may_be_recorded = may_be_recorded
@@ -91,8 +86,6 @@ class TurnAngle:
 
 def is_of_another(wrong_rad: float, spun_rad: float) -> bool:
     """Return whether a reported angle belongs to another motion, not to this turn.
-
-    This is the case if the reported angle differs too much from the turn that the wheel measured.
 
     ``spun_rad``: the turn that the wheel measured. ``wrong_rad``: difference between ``spun_rad``
     and the reported angle.

@@ -19,16 +19,16 @@ another turn."""
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
 """Limits, in rad, for the sum of the turns that were read from records.
 
-When the sum reaches LEAST_RAD, the driver begins to use the ratio of the motors' speeds that the
-records show. When the sum reaches ENOUGH_RAD, it downloads no more records.
+From LEAST_RAD on, the driver uses the ratio of the motors' speeds. From ENOUGH_RAD on, it downloads
+no more records.
 """
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
 UNRECORDED: Final = 3
 """Number of failed downloads in a row after which the driver downloads no more records.
 
-A download fails if it brings no usable record. A cancelled download does not count. A new
-connection sets the count of failures to zero.
+A download without a usable record is a failure, but a cancelled one is not. A new connection resets
+the count.
 """
 _HEAD: Final = re.compile(
     rb"MC Spin sensor data log\r?\n"
@@ -78,28 +78,19 @@ class TurnRecords:
         self._failures += 1
 
     def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
-        """Return the angle of a turn in degrees, with the server's sign, from the file of the turn.
+        """Return a turn's angle in degrees, with the server's sign, from the file of the turn.
 
-        ``name``, ``pieces``: name and content of the file.
-
-        ``request``: the command of the turn.
-
-        The result is None if the file belongs to another turn, or has no angle. It is also None if
-        the name is that of the previous file: the server could not write a new file, and has sent
-        the old file again.
+        None if the file has no angle, or belongs to another turn than ``request``.
         """
+        # the previous name: the server could not write a new file, and has sent the old file again
         again, self._name = name == self._name, name
         return None if again else recorded_deg(pieces, request)
 
     def used(self, told_rad: float, wheel_rad: float) -> None:
-        """Receive a recorded turn that the odometry has used.
+        """Receive a recorded turn that the odometry has used, for the ratio of the motors' speeds.
 
-        The ratio of the motors' speeds is computed from such turns.
-
-        ``told_rad``: the angle of the turn in the record.
-
-        ``wheel_rad``: the part of the turn that the right wheel has caused. With equal motors, this
-        is half of the turn.
+        ``told_rad``: the recorded angle. ``wheel_rad``: the part that the right wheel has caused;
+        with equal motors, half of the turn.
         """
         self._failures = 0
         self._told_rad += abs(told_rad)
@@ -114,13 +105,10 @@ class TurnRecords:
 
 
 def recorded_deg(pieces: list[bytes], request: Request) -> float | None:
-    """Return the angle of a turn in degrees, with the server's sign, from the file of the turn.
+    """Return a turn's angle in degrees, with the server's sign, from the file of the turn.
 
-    ``pieces``: content of the file.
-
-    ``request``: the command of the turn.
-
-    The result is None if the file belongs to another turn, or has no angle.
+    ``pieces``: content of the file. None if the file has no angle, or belongs to another turn than
+    ``request``.
     """
     for piece in pieces:  # the angle is in the first piece, so a later piece may be lost
         if head := _HEAD.match(piece):

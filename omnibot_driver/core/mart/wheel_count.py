@@ -16,9 +16,8 @@ from omnibot_driver.core.mart.moment import Moment
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
 """Tolerance for an encoder count that may be the reply to another query.
 
-The distance since the last count may differ from the expected distance by at most
-DOUBT_M + DOUBT_MPS * (a + b), in m. Here ``a`` is the driving time in s since the last count, and
-``b`` is the uncertainty in s of the time of the reply. Otherwise, the count is rejected.
+The distance may deviate by DOUBT_M + DOUBT_MPS * (driving time + uncertainty of the reply's time),
+in m and s.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time between them.
@@ -35,10 +34,8 @@ counts. A count is unchanged if it is within 1 of the last count before the comm
 class Step:
     """The distance that the wheel has rolled between two counts.
 
-    ``lost``: whether the robot has also moved by an unknown amount.
-
-    ``unsure``: whether the start command may be lost. If the command is lost, the wheel has not
-    rolled.
+    * ``lost``: whether the robot has also moved by an unknown amount.
+    * ``unsure``: whether the start command may be lost, so that the wheel has not rolled.
     """
 
     wheel_m: float
@@ -50,14 +47,10 @@ class Step:
 class WheelCount:
     """The count of the right wheel's encoder.
 
-    ``last``: last accepted count. ``told_s``: most probable time of the last count. ``from_s``:
-    earliest possible time of the last count.
-
-    ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
-
-    ``maybe``: the last reported count, if the network may have lost the last start command, so that
-    the server has not reset the count; else 0. The driver suspects such a loss if the count differs
-    by at most 1 from the last count before the command.
+    * ``last``: last accepted count.
+    * ``told_s``, ``from_s``: most probable and earliest possible time of the last count.
+    * ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
+    * ``maybe``: the last reported count, if the last start command may be lost; else 0.
     """
 
     def __init__(self) -> None:
@@ -89,16 +82,12 @@ class WheelCount:
     def refused(self) -> bool:
         """Record that the server knows of no motion; return whether the server was restarted.
 
-        * The server has acknowledged the motion: nothing changes, and the result is False.
-        * The server has sent a count of the motion, but no acknowledgement: the motion had begun,
-          so the server was restarted, and the result is True. The pose already includes the counts
-          of the motion.
-        * The server has sent no acknowledgement and no count of the motion: the motion did not
-          begin, and the result is False. The last count before the start command is valid again.
+        A restart is proved if the server has sent a count of the motion, but no acknowledgement.
         """
         if self._confirmed:
             return False
         if self._begins:
+            # without a count of the motion, the motion did not begin
             self.last, self._begins = self._before, False
             return False
         return True
@@ -174,8 +163,7 @@ class WheelCount:
     def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
         """Reject an implausible count and return None, except for the third one in a row.
 
-        The third implausible count is accepted, because it is unlikely that three replies in a row
-        are wrong. The result is then ``step``, the step to this count.
+        The result is then ``step``, because three wrong replies in a row are unlikely.
         """
         self._odd += 1
         if self._odd < ODD_TIMES:
@@ -186,8 +174,7 @@ class WheelCount:
     def _falls_back(self, count: int, when: Moment) -> bool:
         """Return whether an uncertain count contradicts the last count, and so is a wrong reply.
 
-        It contradicts the last count of this motion if it is clearly nearer to zero than that
-        count, or if it has the other sign.
+        Such a count is clearly nearer to zero than the last one, or has the other sign.
         """
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:

@@ -46,12 +46,10 @@ class Kind(Enum):
 class Word:
     """One command of the server. Two commands are equal if their texts are equal.
 
-    ``forms``: the forms that a successful reply can have.
-
-    ``takes_s``, ``least_s``: longest and shortest time from the request to the reply, in s.
-
-    ``fails``: the texts that may follow ``fail`` in the reply to this command. The driver also
-    accepts a text that is not listed for any command.
+    * ``forms``: the forms that a successful reply can have.
+    * ``takes_s``, ``least_s``: longest and shortest time from the request to the reply, in s.
+    * ``fails``: the texts that may follow ``fail`` in the reply. A text of no command is accepted,
+      too.
     """
 
     text: str
