@@ -20,27 +20,19 @@ from omnibot_driver.core.requests import Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Time in s after which a command to pause or to reset is repeated if the board still sends data.
+"""Time in s after which a command to pause or to reset is repeated if data still arrive.
 
-A paused board sends a «Paused» text every second. If the board sends data for this time, and no
-such text, the command was lost.
+A paused board sends a «Paused» text every second. If no such text arrives, the command was lost.
 """
 FLOWING_S: Final = 0.1
 """Longest interval in s between two reads that counts in full as time with data.
 
-The time with data is compared with ``PAUSE_RETRY_S``. A running board sends every 10 ms. In an
-interval longer than this limit, the board may have sent nothing for some time, so only
-``FLOWING_S`` counts.
+A running board sends every 10 ms, so it may have been silent in a longer interval.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.
 
-A paused board sends a «Paused» text every second. In two cases, the text proves nothing:
-
-- The text arrives within this time after a command. The board may have sent the text before it
-  received the command.
-- Data arrive within this time after the text. The board may have begun to run after it sent the
-  text.
+A «Paused» text proves nothing within this time after a command, or if data follow within this time.
 """
 HELD: Final = (
     ", but the e-stop is latched: the robot does not move until you release it with ~/estop"
@@ -77,13 +69,11 @@ They save time, because Python 3.11 looks up Enum members slowly.
 
 
 class ModeManager:
-    """The manager of a board's mode.
-
-    It sends the packets that start, pause or reset the board, and repeats them until data show that
-    the board has obeyed.
+    """The manager of a board's mode: repeats start, pause or reset until data show that it was
+    obeyed.
 
     * ``run``: whether to start the board at each connection. If False, the board keeps its mode.
-    * ``answers``: answers to requests. They stay here until the reporter takes and clears them.
+    * ``answers``: answers to requests, until the reporter takes and clears them.
     """
 
     def __init__(self, board: Board, *, run: bool) -> None:
@@ -104,8 +94,7 @@ class ModeManager:
         self._mode_known = False
         """Whether the board's mode was known when the last reset was sent.
 
-        A pause that begins after the reset shows a restart. If the mode was unknown, the pause may
-        have begun before the reset, so it does not show a restart.
+        Only then does a pause that begins after the reset show a restart.
         """
         self._shown_at = math.inf
         self._request: Request | None = None
@@ -203,6 +192,7 @@ class ModeManager:
         ``continues``: whether the board was already paused at its previous report, and has not
         restarted since then.
         """
+        # the board may have sent the text before it received the command
         in_flight = now - self._said_at < IN_FLIGHT_S
         restarted = self._mode_known and not continues
         running_wanted = self._wanted is Wanted.RUNNING
@@ -271,11 +261,9 @@ class ModeManager:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Do what is due at ``now``, at most one of three things.
+        """Confirm a pause, end an overdue request as failed, or repeat the start, if one is due.
 
-        * Report that a pause is confirmed.
-        * End a request as failed, because the board has not confirmed it in time.
-        * Repeat the start bytes, which the board has not obeyed yet.
+        At most one of these is done.
         """
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")
@@ -295,9 +283,8 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether the board may already have obeyed a P, or whether a P may still be on
-        its way. If so, the driver waits for ``PAUSE_RETRY_S`` before the next P, because a second P
-        would resume a paused board.
+        ``with_p``: whether an earlier P may have been obeyed, or may still arrive. The next P then
+        waits for ``PAUSE_RETRY_S``, because a second P would resume a paused board.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

@@ -2,9 +2,9 @@
 
 """The outlier filter: it rejects physically impossible readings that arrive in valid frames.
 
-A spike is a single wrong reading: it leaps (changes implausibly much), and the next reading leaps
-back. Therefore, the filter holds a leaping reading until the next reading arrives.
-docs/internals/architecture.md gives the rules.
+A spike leaps (changes implausibly much), and the next reading leaps back. Therefore, the filter
+holds a leaping reading until the next reading arrives. docs/internals/architecture.md gives the
+rules.
 
 This module knows readings and the robot's limits; it does not know bytes or a clock.
 """
@@ -30,10 +30,8 @@ Stamped = tuple[Reading, float]
 STILL: Final = 0.08
 """Tolerance of the check for spikes of the IMU, as a fraction of a change.
 
-* A change is a spike only if the next reading returns to the reading before the change, within this
-  tolerance.
-* A change of one value is a flipped bit only if all other values of the reading stay constant,
-  within this tolerance.
+The reading after a spike returns within this tolerance. If a bit of one value flips, the other
+values stay within it.
 """
 MOST_HELD: Final = 10
 """Largest number of readings that the filter holds. The first of them is a displacement that
@@ -41,8 +39,8 @@ changed implausibly much. The others are the poses after it."""
 ALIKE: Final = 1.1
 """Largest ratio between the durations of two successive displacements that the filter compares.
 
-The ratio is larger, for example, if the board's message between the two displacements was lost. If
-the filter compared them, even a steady motion would look like a change.
+After a loss, for example, the durations differ so much that a steady motion would look like a
+change.
 """
 BACK: Final = 0.25
 """Tolerance of the check for spikes of displacements, as a fraction of a change.
@@ -57,10 +55,10 @@ class MotionLimits:
     """Limits by which the outlier filter recognises implausible readings.
 
     * ``fastest_…``: the robot cannot exceed them, even when it is pushed by hand.
-    * ``force_step_mps2``: in m/s². A smaller change between two accelerometer readings is never a
-      spike.
-    * ``full_scale_mps2``: full scale of the accelerometer, in m/s². It is infinite if the readings
-      are not integers: the filter then does not look for flipped bits.
+    * ``force_step_mps2``: a smaller change of the accelerometer's reading is never a spike; in
+      m/s².
+    * ``full_scale_mps2``: full scale of the accelerometer in m/s²; infinity if the readings are not
+      integers, so that no bit can flip.
     """
 
     fastest_mps: float = 2.0
@@ -81,17 +79,12 @@ class Refused:
 
 
 class OutlierFilter:
-    """Rejects implausible readings.
-
-    A reading that changes implausibly much may be a spike. So the filter holds it until the next
-    reading arrives.
+    """Rejects implausible readings, and holds a possible spike until the next reading arrives.
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
-    * ``corrected``: whether the board corrects its own odometry. A correction can look like an
-      impossible motion. So if ``corrected`` is True, the filter passes on an impossible but finite
-      displacement, with ``measured`` set to False. It also sets ``possible`` to False, except if
-      the duration of the displacement is 0 or unknown.
+    * ``corrected``: whether the board corrects its own odometry. If True, impossible but finite
+      displacements pass with ``measured`` set to False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -113,8 +106,8 @@ class OutlierFilter:
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
         """Add a reading; return all readings that the filter now passes on.
 
-        The filter passes a reading on at once, unless the reading or an earlier one may be a spike.
-        Such readings are held. Readings of the same kind stay in order.
+        A reading is held while it, or an earlier one, may be a spike. Readings of the same kind
+        stay in order.
         """
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
@@ -172,6 +165,7 @@ class OutlierFilter:
             self._motion_leaps.forget()
             seconds = None if before_s is None else (stamp_s - before_s) or None
         if seconds is not None and not self._possible(reading, seconds):
+            # a correction of the board's odometry can look like an impossible motion
             if self._corrected and isfinite(reading.dx_m + reading.dy_m + reading.dyaw_rad):
                 possible = not reading.duration_s  # after a stall, many arrive at the same time
                 return [(replace(reading, measured=False, possible=possible), stamp_s)]
@@ -217,8 +211,8 @@ class OutlierFilter:
     def _told_of_losses(self, reading: Reading) -> Reading:
         """Return the reading. If it is a pose, add the rejected displacements to its ``lost``.
 
-        A pose includes the motion of all displacements before it. So the rejected displacements are
-        counted like those that were lost on the line.
+        Like a displacement lost on the line, a rejected one is part of the motion that the pose
+        shows.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading

@@ -23,14 +23,13 @@ at the end of the scale. The largest positive reading of 16 bits is just above t
 
 
 class Spikes:
-    """Finds spikes in a series of readings. Each reading is a list of values.
+    """Finds spikes in a series of readings, each of which is a list of values.
 
     The values are scaled so that a change of 1 between two readings is always plausible.
 
     * ``left``: largest remaining change after a spike, as a fraction of the spike.
     * ``knocked``: number of values, from the beginning of the list, that a knock against the robot
-      can change implausibly much. A change of such a value may be a spike only if it looks like one
-      flipped bit.
+      can change. A spike of such a value must look like one flipped bit.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -47,13 +46,10 @@ class Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Return whether the values of the last call were a spike, and whether the new values leap.
+        """Return whether the last call's values were a spike, and whether the new values leap.
 
-        Values leap if they change implausibly much; the next call shows whether they were a spike.
-
-        ``periods``: number of sampling periods between the previous and the new values.
-
-        ``topmost_bit``: value of the highest bit of the accelerations, in the same units as
+        Leaping values change implausibly much. ``periods``: number of sampling periods since the
+        previous values. ``topmost_bit``: highest bit of the accelerations, in the units of
         ``values``.
         """
         leaping, self._leaping = self._leaping, None
@@ -86,16 +82,14 @@ class Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether one flipped bit can explain the change of a value.
 
-        ``step``: size of the change. The readings vary, so the size may differ from the value of a
-        bit by up to ``OUT_OF_PROPORTION`` times the largest recent change.
-
-        ``value``: magnitude of the value after the change. If it is at the end of the
-        accelerometer's scale, the result is False, because a knock against the robot can also cause
-        this value.
+        ``step``: size of the change. ``value``: magnitude after the change. At the end of the
+        accelerometer's scale, the result is False.
         """
         if topmost == inf:  # the readings are not integers
             return False
+        # the readings vary, so the change may differ from the value of a bit
         slack = OUT_OF_PROPORTION * self._restless
+        # a knock against the robot can also bring the value to the end of the scale
         bit = topmost if value < END_OF_SCALE * topmost else 0.0
         while bit > step + slack:
             bit /= 2

@@ -23,9 +23,8 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. With it, the driver counts the IMU readings that are
-      missing between two displacements. None if each IMU reading itself says how many were lost
-      (``lost``).
+    * ``imu_period_s``: period of the IMU in s, for counting lost readings; None if each IMU reading
+      has its own ``lost``.
     """
 
     imu_period_s: float | None = None
@@ -44,8 +43,7 @@ class StreamStatistics:
     delay_s: float = 0.0
     """Sum of delays in s: for each of the ``reads``, the age of its newest sample.
 
-    The driver makes each stamp later than the stamp before it. A stamp can therefore be a few
-    microseconds later than the read, and the age is then below 0.
+    An age can be a few microseconds below 0, because each stamp is later than the one before.
     """
     squared_delay_s2: float = 0.0
     same_force: int = 0
@@ -57,8 +55,7 @@ class StreamStatistics:
     _sent_imu: int | None = field(default=None, repr=False)
     """Number of IMU readings that the board had sent before the last displacement; None if unknown.
 
-    If a later pose shows lost displacements, the IMU readings that the board sent during these
-    displacements are added to the number.
+    Readings during lost displacements are added when a pose shows the loss.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
     _restarted: bool = field(default=False, repr=False)

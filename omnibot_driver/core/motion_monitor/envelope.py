@@ -22,11 +22,10 @@ The ratio is above 1, because controllers overshoot, and users measure the board
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: always allowed deviation from the convex hull of the recent
-set-points, in m/s and rad/s.
+"""``NOISE_MPS``, ``NOISE_RADPS``: always allowed deviation from the hull, in m/s and rad/s.
 
-The encoders' resolution and rounding can cause such a deviation. A slope can also cause it if the
-wheel controllers are slow.
+The hull is that of the recent set-points. The encoders' resolution, rounding and slopes can cause
+such a deviation.
 """
 SIDEWAYS: Final = 0.1
 """Deviation from the set-points that is allowed in any direction.
@@ -63,22 +62,17 @@ _DIRECTIONS: Final = tuple(
 )
 """Directions in which the distance of a velocity from the hull of allowed velocities is computed.
 
-If the direction of the true distance is between two of them, the computed distance is too small: by
-up to 2 % of the distance, plus a tenth of the hull's length.
+Between two of them, the result is too small by up to 2 %, plus a tenth of the hull's length.
 """
 
 
 def outside(
     motion: BodyTwist, explained: Sequence[Velocity], *, heading_known: bool
 ) -> tuple[float, float]:
-    """Return how far the motion is outside the envelope, in m/s and in rad/s.
+    """Return how far the motion is outside the envelope, in m/s and rad/s; inside, 0 or less.
 
-    A value of 0 or less means that the motion is inside.
-
-    ``explained``: the velocities that the recent set-points allow. The first is that of the current
-    set-point.
-
-    ``heading_known``: if False, the direction of the linear velocity is not checked.
+    ``explained``: the allowed velocities, that of the current set-point first. ``heading_known``:
+    if False, the linear velocity's direction is not checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0

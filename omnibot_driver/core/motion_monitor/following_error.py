@@ -4,8 +4,8 @@
 
 The *envelope* is the set of velocities that recent set-points allow (``envelope.py``). The error is
 the sum of the motion outside the envelope. A displacement inside the envelope resets the error to
-0. A single damaged displacement or a short jerk cannot raise the error above its limit. This module
-knows velocities in the board's own axes, and times; it does not know which fault an error shows.
+0. This module knows velocities in the board's own axes, and times; it does not know which fault an
+error shows.
 """
 
 from typing import Final
@@ -18,28 +18,22 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
-A robot is assumed to be held if, in a displacement, it is clearly slower than all its recent
-set-points: those during the displacement, and those in the ``RISING_S`` before it.
+A robot that is clearly slower than all set-points of this time is assumed to be held.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of the error's limit that one displacement adds.
+"""Largest fraction of the error's limit that a displacement of up to 60 ms, or a longer one, adds.
 
-The first value is for displacements of up to 60 ms, the second for longer displacements. With these
-values, the error exceeds its limit only after three displacements in a row, or after two longer
-ones.
+So only three displacements in a row, or two longer ones, can exceed the limit.
 """
 
 
 class FollowingError:
     """The following error of one robot: the sum of its motion outside the envelope.
 
-    The envelope is the set of velocities that recent set-points allow.
-
-    * ``slack_mps``, ``slack_radps``: tolerated excess of a velocity over the envelope, in m/s and
-      rad/s.
-    * ``outside``: whether the last displacement was outside the envelope by more than the slack.
+    * ``slack_mps``, ``slack_radps``: tolerated excess of a velocity, in m/s and rad/s.
+    * ``outside``: whether the last displacement exceeded the envelope by more than the slack.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
@@ -74,9 +68,8 @@ class FollowingError:
     ) -> None:
         """Add one displacement to the error, or reset the error if the set-points allow the motion.
 
-        ``motion``: mean twist during ``seconds`` from the time ``begun_s`` on.
-
-        ``heading_known``: if False, the direction of the linear velocity is not checked.
+        ``motion``: mean twist during ``seconds`` from ``begun_s`` on. ``heading_known``: if False,
+        the linear velocity's direction is not checked.
         """
         newest = history.since(begun_s - RISING_S)
         way_mps = turn_radps = 0.0

@@ -129,9 +129,8 @@ class MotionMonitor:
     def release(self) -> None:
         """Record that the driver's e-stop was released.
 
-        The board has an e-stop of its own, which may still hold the robot. So a robot that does not
-        obey motion commands has the fault HELD_BY_ESTOP instead of BLOCKED, until the robot has
-        moved as commanded.
+        The board's own e-stop may still hold the robot. So a blocked robot has the fault
+        HELD_BY_ESTOP until it has moved as commanded.
         """
         self._released = True
 
@@ -158,9 +157,8 @@ class MotionMonitor:
     def count_impossible(self, now: float) -> Fault | None:
         """Return the fault that four impossible displacements in a row show, or None.
 
-        Call this method instead of ``check`` if the board corrects its own odometry and the
-        displacement is impossible. Fewer than four in a row are regarded as corrections of the
-        odometry.
+        Call this method instead of ``check`` if the board corrects its own odometry; fewer than
+        four may be corrections.
         """
         self._error.reset()
         self._impossible += 1
@@ -227,12 +225,8 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot whose motion does not fit its commands.
 
-        Such a robot is too fast, or it moves in the wrong direction:
-
-        - The linear velocity is too fast if its direction is within 60° of a set-point's direction,
-          or if the heading is unknown. In all other cases, its direction is wrong.
-        - The yaw rate is too fast if it has the same sign as a set-point's yaw rate. In all other
-          cases, the robot turns in the wrong direction.
+        Motion in a set-point's direction, within 60°, is too fast; other motion goes the wrong way.
+        Without a known heading, linear motion is too fast.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -247,11 +241,8 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
 
-        Stop is due when the robot has moved too far without a command: the following error exceeds
-        its limit. While the robot continues to move, for example because somebody pushes it, Stop
-        is due again at longer and longer intervals.
-
-        ``begins``: whether the following error exceeds its limit now.
+        While the motion continues, Stop is due at longer and longer intervals. ``begins``: whether
+        the following error exceeds its limit now.
         """
         if not self._error.outside:
             self._stood_s += seconds
@@ -265,6 +256,7 @@ class MotionMonitor:
         self._moved_s += seconds
         if self._moved_s < self._stop_again_s:
             return None
+        # somebody may be pushing the robot, so Stop is repeated less and less often
         self._stop_again_s = STOPS_S + (self._moved_s if not self._has_stood else 2 * self._moved_s)
         return Fault.UNCOMMANDED
 

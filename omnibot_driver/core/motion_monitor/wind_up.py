@@ -31,8 +31,8 @@ FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants of the wind-up's decay, in s.
 
-``FORGOTTEN_AT_REST_S`` applies while the robot is commanded to rest, ``FORGOTTEN_S`` while it is
-commanded to move. A robot that is held at rest keeps its wind-up for longer.
+``FORGOTTEN_AT_REST_S`` applies while the robot is commanded to rest. A robot that is held at rest
+keeps its wind-up for longer.
 """
 HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""
@@ -59,18 +59,14 @@ class WindUp:
         self._unproved_m: float | None = None
         """Distance in m to add to the wind-up if the robot is held in the next displacement too.
 
-        The robot fell behind its set-point by this distance. But one long displacement does not
-        prove that the robot was held. 0: the robot was held in the last displacement, and no
-        distance remains to be added. None: the robot was not held in the last displacement.
+        0: the robot was held in the last displacement, and nothing is due. None: it was not held.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract from the wind-up the distance by which a motion exceeds the allowed motion.
+        """Subtract a motion's excess from the wind-up; return whether the wind-up was large enough.
 
-        Return whether the wind-up was larger than this distance, and so explains the motion.
-
-        ``way_mps``, ``turn_radps``: by how much the velocities of the motion exceed the allowed
-        velocities. ``seconds``: duration of the motion.
+        ``way_mps``, ``turn_radps``: by how much the motion exceeds the allowed velocities.
+        ``seconds``: duration of the motion.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -96,15 +92,10 @@ class WindUp:
     ) -> None:
         """Add to the wind-up the distance by which a held robot falls behind its set-point.
 
-        A robot is held if, for example, a hand or an obstacle makes it much slower than its
-        set-point. If the robot is not held, the wind-up decays.
-
-        ``motion``: mean twist during ``seconds``. The caller has checked that this twist is within
-        the envelope of the set-points.
-
-        ``newest``: set-points that the robot may still be approaching, the current one first.
-
-        ``heading_known``: if False, the direction of the linear velocity is not checked.
+        * If the robot is not held, the wind-up decays.
+        * ``motion``: mean twist during ``seconds``, within the envelope of the set-points.
+        * ``newest``: set-points that the robot may still be approaching, the current one first.
+        * ``heading_known``: if False, the direction of the linear velocity is not checked.
         """
         current, lost_mps = newest[0], 0.0
         if current is AT_REST and not self.way_m:
@@ -124,6 +115,7 @@ class WindUp:
             forgotten_s = FORGOTTEN_AT_REST_S if current is AT_REST else FORGOTTEN_S
             self.way_m *= math.exp(-seconds / forgotten_s)
         elif self._unproved_m is None and seconds > LONG_S:
+            # one long displacement does not prove that the robot was held
             self._unproved_m = lost_mps * seconds
         else:
             self.way_m = min(MOST_M, self.way_m + (self._unproved_m or 0.0) + lost_mps * seconds)
