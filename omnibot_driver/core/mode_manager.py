@@ -69,8 +69,7 @@ They save time, because Python 3.11 looks up Enum members slowly.
 
 
 class ModeManager:
-    """The manager of a board's mode: repeats start, pause or reset until data show that it was
-    obeyed.
+    """The manager of a board's mode: repeats start, pause or reset until the board has obeyed.
 
     * ``run``: whether to start the board at each connection. If False, the board keeps its mode.
     * ``answers``: answers to requests, until the reporter takes and clears them.

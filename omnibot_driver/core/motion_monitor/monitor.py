@@ -226,7 +226,7 @@ class MotionMonitor:
         """Return the fault of a robot whose motion does not fit its commands.
 
         Motion in a set-point's direction, within 60°, is too fast; other motion goes the wrong way.
-        Without a known heading, linear motion is too fast.
+        While the heading is unknown, any linear motion is too fast.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

@@ -14,10 +14,10 @@ from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
 
 BEGUN_M: Final = 0.005
 BEGUN_RAD: Final = 0.01
-"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations, in m and rad, of a pose from the pose that is
-expected if the board began at zero. A pose within these limits shows that the board began at zero:
-only rounding makes such a pose deviate. A robot that drives to the origin in a gap rarely stops so
-near to the origin.
+"""``BEGUN_M``, ``BEGUN_RAD``: a pose this near to the expected one shows a board's start at zero.
+
+The limits are in m and rad. The expected pose is that after such a start; a robot rarely drives so
+near by chance.
 """
 
 
@@ -55,14 +55,12 @@ class BoardFrame:
     def continues(self, told: Pose, gap: Covariance) -> bool:
         """Return whether a pose continues the board's frame, although the pose counter began anew.
 
-        The pose counter begins anew if the board restarts, or after a damaged pose. A restart takes
-        longer than a period, so displacements are lost. The result is therefore True if no
-        displacement was lost since the last accepted pose, and the pose is near the expected place.
-
-        ``gap``: covariance of the motion that was lost since the last accepted pose.
+        A damaged pose also makes the counter begin anew, but without a loss. ``gap``: covariance of
+        the motion lost since the last accepted pose.
         """
         if self.pose is None or self.since_restart is not None:
             return False
+        # a restart takes longer than a period, so displacements are lost
         return gap == NOTHING and expected(self.pose.way_to(told), gap)
 
     def was_replaced(
@@ -70,22 +68,14 @@ class BoardFrame:
     ) -> bool:
         """Return whether a pose shows that the board uses a new frame since a suspected restart.
 
-        The board's pose is zero at a restart. The first rule that applies gives the result:
-
-        * The pose is near the pose expected after a restart, and farther from the pose expected
-          without a restart: True.
-        * The pose is near the pose expected without a restart: False, and the suspicion ends.
-        * The pose is confirmed and reachable: False, and the suspicion ends.
-        * In all other cases: ``confirmed``.
-
-        ``told``: the pose. ``before``: the pose minus the displacements that wait for a pose.
-
-        ``confirmed``: whether the pose agrees with the last unexpected pose of the board.
-
-        ``reachable``: whether the robot can have reached the pose without a restart.
+        * A pose that refutes the restart ends the suspicion.
+        * ``before``: ``told`` minus the displacements that wait for a pose.
+        * ``confirmed``: whether ``told`` agrees with the last unexpected pose of the board.
+        * ``reachable``: whether the robot can have reached ``told`` without a restart.
         """
         assert self.pose is not None
         assert self.since_restart is not None
+        # the board's pose is zero at a restart
         anew = self.since_restart.way_to(told)
         went_on = self.pose.way_to(before)
         if expected(anew, gap) and _size(anew) < _size(went_on):

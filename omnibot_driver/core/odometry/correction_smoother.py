@@ -16,8 +16,7 @@ SPREAD_S: Final = 0.2
 class CorrectionSmoother:
     """Moves ``pose``, the published pose, towards ``target``, the best known pose.
 
-    In each step, ``pose`` first follows the robot's own motion. Then it is corrected, but moves and
-    turns at most as far in this step as the robot could.
+    In each step, ``pose`` moves and turns at most as far as the robot could.
     """
 
     def __init__(self) -> None:
@@ -66,10 +65,8 @@ class CorrectionSmoother:
     def follow(self, seconds: float) -> None:
         """Move ``pose``, the published pose, a part of the way to ``target``, the best known pose.
 
-        ``seconds``: duration of this step. The longer the step, the larger this part.
-
-        In each step, ``pose`` moves and turns at most as far as the robot could. The displacement
-        that the method ``move`` has applied in this step counts towards this limit.
+        ``seconds``: duration of this step. In a step, ``move`` and ``follow`` together move
+        ``pose`` at most as far as the robot could.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

@@ -34,7 +34,7 @@ Below this limit, the slip of the wheels causes larger position errors.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
-    """How fast the uncertainty grows. Each wheel has its own errors, which add to the body's error.
+    """How fast the uncertainty grows. Each wheel has its own errors.
 
     * ``wheel_drift``: standard deviation of a wheel's random error after 1 m of rim motion, in m.
     * ``wheel_scale``: standard deviation of a wheel's relative size error.
@@ -105,9 +105,8 @@ class Covariance:
     def of_direction(self) -> "Covariance":
         """The covariance if the yaw is regarded as a direction, as in a quaternion.
 
-        Whole turns do not change a direction. So the variance of the yaw is at most that of an
-        unknown direction. The covariances of the yaw with x and y decrease by the same factor
-        as the variance of the yaw.
+        The yaw's variance is at most that of an unknown direction. Its covariances decrease by the
+        same factor.
         """
         if self.yaw_yaw <= UNKNOWN_YAW_VARIANCE:
             return self
@@ -140,15 +139,10 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 
 
 class Astray:
-    """Two errors of the position that grow with the variance of the heading.
+    """Two position errors, along and across the motion, that grow with the variance of the heading.
 
-    One error is along the motion, the other is across it. The standard deviation of each error is
-    the driven distance times ``ASTRAY`` times the variance of the heading, but at most the driven
-    distance. While this variance does not grow, a way back cancels the errors of the way out.
-
-    Other code adds the position error that is proportional to the heading's error.
-
-    ``m2``: variance of x and of y, in m².
+    The position error that is proportional to the heading's error is not included. ``m2``: variance
+    of x and of y, in m².
     """
 
     def __init__(self) -> None:
@@ -166,6 +160,7 @@ class Astray:
         ``rad2``: variance of the heading. The more this variance has grown since the previous call,
         the less the new errors are correlated with the earlier errors.
         """
+        # while the variance does not grow, a way back cancels the errors of the way out
         kept = min(1.0, self._rad2 / rad2)
         part = min(1.0, ASTRAY * rad2)
         x_m, y_m = kept * self._along_m[0], kept * self._along_m[1]
@@ -230,11 +225,8 @@ class Uncertainty:
     ) -> None:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
 
-        The uncertainty is the possible deviation from a motion at constant speed. Within the time
-        t, the robot may accelerate with the acceleration a and then brake. It then deviates by at
-        most a·t²/4. The deviation is also limited by the fastest speeds.
-
-        ``counted_s``: duration of the first part of this gap, whose uncertainty was added earlier.
+        The uncertainty is the possible deviation from a motion at constant speed. ``counted_s``:
+        duration of the first part of this gap, whose uncertainty was added earlier.
         """
         self.gap += Covariance.diagonal(
             _unheard_variance(self.noise.unheard_mps2, fastest_mps, duration_s, counted_s),
@@ -244,12 +236,8 @@ class Uncertainty:
     def halt(self, way_m: float, turn_rad: float) -> None:
         """Add the uncertainty of a robot that came to rest unseen, because its board restarted.
 
-        ``way_m``, ``turn_rad``: mean distance and mean angle that the robot moved until it was at
-        rest. They become the standard deviations of position and heading. The variance of the
-        heading is limited to that of an unknown heading.
-
-        If a later pose shows that the board has not restarted, ``settle`` removes this uncertainty.
-        The uncertainty does not increase the tolerance of the pose gate.
+        ``way_m``, ``turn_rad``: mean motion until rest. ``settle`` removes this uncertainty again.
+        The pose gate does not use it.
         """
         variance = min(turn_rad * turn_rad, UNKNOWN_YAW_VARIANCE)
         self._halt += Covariance.diagonal(way_m * way_m, variance)
@@ -261,8 +249,8 @@ class Uncertainty:
     def bound(self, way_m: float, turn_rad: float) -> None:
         """Set the total uncertainty of all gaps to the error that the gaps have caused.
 
-        ``way_m``, ``turn_rad``: this error in m and rad. A pose of the board has shown the error,
-        but ``use_board_pose`` is False, so the error is not corrected.
+        ``way_m``, ``turn_rad``: this error in m and rad. The error stays uncorrected, because
+        ``use_board_pose`` is False.
         """
         self.gap = Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
         self._halt = NOTHING
@@ -300,6 +288,7 @@ def _unheard_variance(acceleration: float, fastest: float, until_s: float, from_
 
     ``from_s``, ``until_s``: duration of the gap in s, before and after it gets longer.
     """
+    # a robot that accelerates, and then brakes, deviates by at most a·t²/4
     before, after = (
         min(acceleration * duration_s * duration_s / 4, fastest * duration_s) ** 2
         for duration_s in (from_s, until_s)

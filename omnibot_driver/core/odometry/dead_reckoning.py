@@ -91,9 +91,8 @@ class DeadReckoning:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Add a motion (``tangent``, twist x time), in the board's body axes, to the odometry.
 
-        ``seconds``: duration of the motion in s, by the board's clock.
-
-        ``stamped_s``: duration of the motion in s, computed from the stamps before and after it.
+        ``seconds``, ``stamped_s``: duration of the motion in s, by the board's clock and by the
+        stamps.
         """
         self.track.move(tangent, seconds, stamped_s)
         self.frame.gate.passed(seconds)
@@ -101,10 +100,8 @@ class DeadReckoning:
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
         """Add an assumed motion (``tangent``) for a gap in the displacements.
 
-        ``seconds``: duration of the gap, computed from the number of lost displacements.
-
-        ``stamped_s``: duration of the gap in s, computed from the stamps. If it is the shorter one,
-        the published pose moves at most as far as the robot can in this time.
+        ``seconds``, ``stamped_s``: duration of the gap in s, by the number of lost displacements
+        and by the stamps. The shorter one limits the published motion.
         """
         frame = self.frame
         if frame.pose is not None:

@@ -17,8 +17,8 @@ from omnibot_driver.core.values import value
 class OdometrySettings:
     """The settings of the odometry.
 
-    * ``use_board_pose``: whether the board's poses correct the odometry. If False, they give only
-      the heading: once at the beginning, and again when the odometry is reset after a gap.
+    * ``use_board_pose``: if False, the board's poses do not correct the odometry. They only give
+      the heading, at the beginning and after a reset that follows a gap.
     * ``fastest_mps``, ``fastest_radps``: speeds that even a pushed robot does not exceed.
     * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the reported ones.
     """

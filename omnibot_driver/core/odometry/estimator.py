@@ -27,8 +27,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 LONGEST_WAIT_S: Final = 1.0
 """Longest time, in s of the board's clock, to wait for a pose that gives the heading.
 
-After this time, the driver assumes the heading of the last pose, although no other pose has
-confirmed it. If no pose has arrived, the driver assumes heading 0.
+After this time, the driver assumes the heading of the last, unconfirmed pose; without a pose, 0.
 """
 LONG_GAP_S: Final = 1.0
 """If displacements are lost for more than this time, in s, the next displacements wait for a pose
@@ -39,8 +38,7 @@ by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation, in rad, with which the board's heading counts as known.
 
-Only lost displacements make the heading uncertain, because the turn during the loss is unknown.
-When a pose of the board has shown the lost motion, the heading is known again.
+Only lost displacements make the heading uncertain, until a pose shows the lost motion.
 """
 
 
@@ -66,8 +64,8 @@ class Odometry:
         self._since_gap: Pose | None = None
         """The pose that the board would report now if it had begun a new coordinate frame in a gap.
 
-        The gap is the longest one since the board's last pose. None if there was no gap since the
-        board's last pose, or if the robot was near the origin of the old frame before the gap.
+        The longest gap since the last pose counts. None without a gap, or if it began near the
+        origin.
         """
         self._gap_lost = 0
         """Number of displacements lost in the gap of ``_since_gap``; 0 without such a gap."""
@@ -103,25 +101,17 @@ class Odometry:
     def reset(self, now: float = math.inf) -> list[OdometryEstimate]:
         """Move the origin of the odometry frame to the robot's current pose.
 
-        Return the estimates of displacements that were still waiting for a pose. If they waited for
-        the board's first pose, they are discarded, and the result is empty.
-
-        If a gap ends with the next displacement, and most of this gap was before the reset, the
-        motion in the gap and in this displacement is discarded too. The estimate of this
-        displacement is then at the origin, with an unknown twist.
-
-        If motion was lost before the reset, the board's heading is uncertain. The odometry then
-        takes the heading from the board's next poses, as it did at the beginning.
-
-        ``now``: time of the reset in s, by the clock of the stamps. If it is infinity (the
-        default), the odometry assumes that the whole gap was before the reset.
+        Return the estimates of displacements that waited for a pose. Motion in a gap that is mostly
+        before ``now`` (s, by the stamps' clock) is discarded.
         """
         self.alignments += 1
         due = []
         if self._frame.pose is not None:
             due = self._release()
             if self._track.uncertainty.gap != NOTHING and self._gate.proved is not None:
+                # the heading is uncertain, so the board's next poses must give it
                 self._frame.forget()
+        # displacements that wait for the board's first pose are discarded
         self._backlog, self._told_lost = PendingDisplacements(), 0
         self._track.begin()
         self._reset_s = now
@@ -137,6 +127,7 @@ class Odometry:
         reset_s, self._reset_s = self._reset_s, None
         if reset_s is not None:
             gap_s = self._gap_s(reading, stamp_s)
+            # most of the gap was before the reset, so its motion belongs to the old frame
             if gap_s and stamp_s - reset_s < gap_s / 2:
                 due = self.displace(reading, stamp_s) + self.reset(stamp_s)
                 return [
@@ -217,11 +208,8 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Convert ``place`` from the odometry frame into the board's frame.
 
-        The board's heading is unwrapped: it can be larger than one turn. Of all headings that mean
-        the same direction, the result has the one that is nearest to the robot's current heading.
-
-        Return None if ``use_board_pose`` is False. Also return None while the relation of the two
-        frames is unknown, because no pose of the board has shown it.
+        The unwrapped heading is the one nearest to the robot's. None without ``use_board_pose``, or
+        while no pose has shown the relation of the frames.
         """
         if self._frame.pose is None or self._frame.since_restart is not None or not self._settles:
             return None
@@ -247,11 +235,8 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the pose is in a new frame of the board, which the odometry must adopt.
 
-        ``confirmed``: whether the pose agrees with the last unexpected pose.
-
-        While no frame is known, the result is ``confirmed``. When a frame is known, and no restart
-        of the board is suspected, the result is False. When a restart is suspected,
-        ``BoardFrame.was_replaced`` decides.
+        ``confirmed``: whether the pose agrees with the last unexpected pose. This decides while no
+        frame is known.
         """
         frame = self._frame
         if frame.pose is None:
@@ -269,15 +254,11 @@ class Odometry:
     def _began_in_gap(self, told: Pose, since_gap: Pose) -> bool:
         """Return whether a pose shows that the board began a new frame in a gap before the pose.
 
-        The counters cannot show this: they would be the same after a loss of all displacements in
-        the gap.
-
-        ``told``: the pose.
-
         ``since_gap``: the pose that is expected if the board began a new frame.
         """
         assert self._frame.pose is not None
         gap = self._track.uncertainty.gap
+        # the counters do not help: without a new frame, they would be the same after the gap
         went_on = not self._backlog and expected(self._frame.pose.way_to(told), gap)
         return is_begun(since_gap.way_to(told)) and not went_on
 
@@ -302,10 +283,8 @@ class Odometry:
     def _resume(self, told: Pose, lost_s: float) -> list[OdometryEstimate]:
         """Use a pose of the board to compute the motion of lost displacements.
 
-        Displacements that arrived after the loss have waited for this pose. Their estimates are
-        returned.
-
-        ``lost_s``: duration of the gap in s. It is used only if no displacement has waited.
+        Return the estimates of displacements that waited for this pose. ``lost_s``: duration of the
+        gap in s, if no displacement has waited.
         """
         assert self._frame.pose is not None
         last_stamp_s = self._reckoning.last_stamp_s
@@ -338,8 +317,6 @@ class Odometry:
         """Accept a pose of the board, or keep it as ``doubted`` until the next pose.
 
         A pose is accepted if it is reachable and expected, or if it confirms the last doubted pose.
-        If the robot cannot have reached a confirmed pose, the board's frame has moved, and not the
-        robot.
         """
         assert self._frame.pose is not None
         way = self._frame.pose.way_to(told)

@@ -17,9 +17,10 @@ from omnibot_driver.core.odometry.pending_displacements import (
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest time, in s of the board's clock, over which motion is interpolated. If the board sends no
-data, the driver stops the robot before this time has passed. So the robot is unlikely to move for
-longer in a gap."""
+"""Longest time, in s of the board's clock, over which motion is interpolated.
+
+Without data, the driver stops the robot earlier, so the robot is unlikely to move for longer.
+"""
 NO_WAY: Final = Pose()
 
 
@@ -27,10 +28,8 @@ class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after the loss.
 
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
-      If only poses arrive, ``last`` is the motion between two accepted poses, divided by the number
-      of lost displacements.
-    * ``missing``: number of lost displacements that poses have shown since the last displacement
-      or accepted pose. The odometry assumes the motion ``last`` for each of them.
+    * ``missing``: number of lost displacements that poses have shown since the last displacement or
+      accepted pose.
     """
 
     def __init__(self) -> None:
@@ -42,11 +41,10 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """Return two tangents (twist x time) in body axes.
+        """Return two tangents in body axes: of all lost displacements together, and of ``reading``.
 
-        The first tangent is the motion of all lost displacements together. The second is the motion
-        that ``reading`` reports. ``heading_rad``: heading before the losses; None if no pose has
-        arrived. If it is None, ``reading`` is assumed to be in body axes.
+        ``heading_rad``: heading before the losses. If it is None, because no pose has arrived,
+        ``reading`` is assumed to be in body axes.
         """
         last, self.last = self.last, None
         self.missing, self._only_poses = 0, False
@@ -83,14 +81,13 @@ class GapInterpolation:
     def prove(self, way: Pose = NO_WAY) -> None:
         """Record that a pose was accepted.
 
-        ``way``: the motion from the previous accepted pose to this pose, minus the motion that the
-        odometry had assumed; a tangent in body axes.
-
-        If all displacements between the two poses were lost, ``way`` is used to correct ``last``:
-        the motion that the odometry assumes for each further lost displacement.
+        ``way``: correction of the assumed motion since the previous accepted pose; a tangent in
+        body axes. It corrects ``last`` if all displacements since then were lost.
         """
         if self._only_poses and self.missing and self.last is not None:
             tangent, period_s = self.last
+            # if only poses arrive, ``last`` is the mean motion of the displacements between two
+            # poses
             part = 1 / self.missing
             self.last = tangent + way.times(part, part, part), period_s
         self.missing, self._only_poses = 0, True

@@ -60,8 +60,8 @@ class PendingDisplacements:
     def lost_s(self) -> float:
         """Estimated duration in s of the displacements lost before the first one that waits here.
 
-        Each lost displacement is assumed to last as long as this first displacement. If the
-        duration of the first displacement is unknown, the value is 0.
+        Each is assumed to last as long as this first one. If that duration is unknown, the value is
+        0.
         """
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
@@ -73,10 +73,8 @@ class PendingDisplacements:
     def unheard_s(self, last_stamp_s: float | None) -> float:
         """Return how long, in s, the board reported nothing before the first waiting displacement.
 
-        If the duration of this displacement is known, the result is this duration times the number
-        of displacements that were lost before it. If the duration is unknown, the result is the
-        stamp of the displacement minus ``last_stamp_s``, the stamp of the last report; or 0 if
-        ``last_stamp_s`` is None.
+        ``last_stamp_s``: stamp of the last report, used if the displacement's duration is unknown.
+        If both are unknown, the result is 0.
         """
         if not self._waiting:
             return 0.0

@@ -17,11 +17,10 @@ from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
-"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: largest deviations from the expected pose, in m and rad,
-with which a pose is accepted at once. A pose that deviates more must be confirmed by the next one.
+"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: limits for a pose's deviation, in m and rad.
 
-After a loss of displacements, both limits are larger, because the robot may have moved during the
-loss. The next accepted pose includes this motion, so the limits then have their usual values again.
+A pose that deviates more from the expected one must be confirmed by the next. After lost
+displacements, the limits are larger until a pose is accepted.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -49,9 +48,8 @@ class PoseGate:
     def displaced(self, reading: DisplacementReading, *, bridges: bool) -> None:
         """Add a reported motion of the robot to ``doubted``, a pose that must still be confirmed.
 
-        ``bridges``: whether to add also the displacements that were lost before this motion. Each
-        lost displacement is assumed to equal this motion. If ``bridges`` is False, the caller adds
-        the lost displacements with the method ``bridged``.
+        ``bridges``: whether to add the displacements lost before, too, each assumed equal to this
+        one. If False, the caller calls ``bridged``.
         """
         if self.doubted is None:
             return
@@ -82,13 +80,10 @@ class PoseGate:
         return possible
 
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether the new pose ``told`` confirms ``doubted``, the last unexpected pose.
+        """Return whether the pose ``told`` confirms ``doubted``, the last unexpected pose.
 
-        The result is False if there is no ``doubted`` pose. If the two poses do not agree,
-        ``doubted`` is counted as rejected. After this call, there is no ``doubted`` pose.
-
-        ``gap``: covariance of the motion that was lost since the last accepted pose. It increases
-        the tolerated difference.
+        In any case, ``doubted`` is then None; if not confirmed, it counts as rejected. ``gap``:
+        covariance of the motion lost since the last accepted pose.
         """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)
@@ -102,12 +97,8 @@ class PoseGate:
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
         """Return whether the robot can have reached the pose ``told`` since the last accepted pose.
 
-        The result is False if no pose was accepted yet.
-
-        ``seconds``: time in s in which the robot may have moved, in addition to the time recorded
-        with ``passed``.
-
-        ``mps``, ``radps``: largest speeds of the robot, in m/s and rad/s.
+        False without an accepted pose. ``seconds``: possible time of motion in s, beyond the time
+        recorded with ``passed``. ``mps``, ``radps``: largest speeds.
         """
         if self.proved is None:
             return False
@@ -122,10 +113,8 @@ class PoseGate:
 def expected(way: Pose, gap: Covariance) -> bool:
     """Return whether rounding or lost displacements can explain the deviation of a pose.
 
-    ``way``: the difference between this pose and the expected pose.
-
-    ``gap``: covariance of the motion in the displacements that were lost since the last accepted
-    pose.
+    ``way``: deviation from the expected pose. ``gap``: covariance of the motion lost since the last
+    accepted pose.
     """
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS

@@ -67,9 +67,8 @@ class PoseTracker:
     def way_to(self, place: Pose) -> Pose:
         """Return the tangent (twist x time) from the robot's best pose to ``place``.
 
-        Its turn is in the direction with the smaller angle. The tangent is in the board's body
-        axes, and not corrected by ``scale``. So it can be compared with the tangents that the board
-        reports.
+        The tangent is like the board's reports: in the board's body axes, not corrected by
+        ``scale``. It turns by the smaller angle.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
@@ -77,8 +76,8 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent (twist x time). The motion took ``seconds``.
 
-        ``stamped_s``: time in s from the stamp before the motion to the stamp after it. The
-        published pose moves at most as far as the robot can move in ``stamped_s``.
+        ``stamped_s``: duration in s by the stamps. The published pose moves at most as far as the
+        robot can in this time.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
@@ -102,10 +101,8 @@ class PoseTracker:
     def resume(self, tangent: Pose) -> None:
         """Add the motion during a gap, which a pose of the board has shown.
 
-        The best known pose moves at once. The published pose follows, but not faster than the robot
-        could move.
-
-        ``tangent``: the motion during the gap (twist x time).
+        The published pose follows no faster than the robot could. ``tangent``: the motion during
+        the gap (twist x time).
         """
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
@@ -124,18 +121,17 @@ class PoseTracker:
     def bound(self, tangent: Pose) -> None:
         """Set the total uncertainty of all gaps until now to the error that the gaps have caused.
 
-        ``tangent``: this error (twist x time). A pose of the board has shown the error, but
-        ``use_board_pose`` is False, so the error is not corrected.
+        ``tangent``: this error (twist x time), which stays uncorrected, because ``use_board_pose``
+        is False.
         """
         error = _times(tangent, self._size)
         self.uncertainty.bound(error.way_m, error.yaw_rad)
 
     def _part(self, tangent: Pose) -> Pose:
-        """Return a motion in REP-103's axes, with true distances and turns; also record it.
+        """Record a reported motion; return it in REP-103's axes, with true distances and turns.
 
-        The motion is added to ``rolled``, and its errors are added to the uncertainty.
-
-        ``tangent``: the motion (twist x time), as the board reports it.
+        The motion is added to ``rolled``, and its errors to the uncertainty. ``tangent``: the
+        motion (twist x time), as the board reports it.
         """
         self.rolled += _times(tangent, self._size)
         signed = _times(tangent, self._signed_size)

@@ -103,8 +103,8 @@ class CommandEncoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist that the last command frame in ``packets`` commands.
 
-        For Stop, the emergency stop, and data without a command frame, the result is zero. If the
-        last command frame is a goal, the result has no meaning.
+        The twist is zero for Stop, the emergency stop, and data without a command frame. For a
+        goal, it has no meaning.
         """
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])
@@ -119,8 +119,8 @@ class CommandEncoder:
     def drive_to(self, pose: Pose) -> bytes:
         """Encode a goal in the board's own frame, for positional control.
 
-        A goal at the origin is a real position, not Stop. Raises CommandRefused if a value exceeds
-        16 bits, or if a high byte is a letter (S, P, R).
+        The origin is a goal, too, not Stop. Raises CommandRefused if a value exceeds 16 bits, or if
+        a high byte is a letter (S, P, R).
         """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
