@@ -27,7 +27,8 @@ A paused board sends a «Paused» text every second. If no such text arrives, th
 FLOWING_S: Final = 0.1
 """Longest interval in s between two reads that counts in full as time with data.
 
-A running board sends every 10 ms, so it may have been silent in a longer interval.
+A running board sends every 10 ms. Of a longer interval, only ``FLOWING_S`` counts, because the
+board may have been silent.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.

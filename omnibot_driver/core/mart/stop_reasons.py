@@ -23,7 +23,7 @@ This time is BLIND_S (s), plus TRIPS times the average duration of an exchange.
 FROZEN_S, FROZEN_TIMES = 0.5, 3
 """Limits for a constant heading. If both are reached, the driver stops the robot.
 
-``FROZEN_S``: time in s, in addition to twice the average duration of a query.
+``FROZEN_S``: time in s, plus twice the average duration of a query.
 
 ``FROZEN_TIMES``: number of replies with the same heading.
 """
@@ -46,9 +46,9 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel, which has no encoder, may turn unseen.
 
-``STUCK_S``: if the robot is stopped because it does not seem to move.
+``STUCK_S``: in a robot that does not seem to move.
 
-``COASTS_S``: if the robot is stopped because a wheel is blocked.
+``COASTS_S``: in a robot that is stopped because a wheel is blocked.
 """
 
 

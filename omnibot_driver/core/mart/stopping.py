@@ -70,12 +70,11 @@ class Stopping:
     """The stop of one motion.
 
     * ``began_s``: time of the first stop command.
-    * ``owed``: number of unanswered earlier requests. A late reply to one of them would look like a
-      reply to a stop command.
+    * ``owed``: number of earlier requests whose late replies would look like replies to a stop.
     * ``move``: the controlled move to stop, whose reply ends the stop; None for another motion.
     * ``planned``: whether the motion is stopped without a fault.
     * ``rounds``: number of times that the driver has sent the stop to the command port.
-    * ``strange``: the last unexpected reply to a stop, as a text for the user; empty without one.
+    * ``strange``: the failure to report to the user if the stop does not succeed; may be empty.
     """
 
     def __init__(
@@ -135,7 +134,7 @@ class Stopping:
     def asks_name(self, now: float) -> bool:
         """Return whether to send HELLO together with the stop of a controlled move.
 
-        The answer proves that the move has ended, even if the reply to the move is lost.
+        The server's answer proves that the move has ended, even if the move's own reply is lost.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 

@@ -55,10 +55,10 @@ class MotionLimits:
     """Limits by which the outlier filter recognises implausible readings.
 
     * ``fastest_…``: the robot cannot exceed them, even when it is pushed by hand.
-    * ``force_step_mps2``: a smaller change of the accelerometer's reading is never a spike; in
-      m/s².
-    * ``full_scale_mps2``: full scale of the accelerometer in m/s²; infinity if the readings are not
-      integers, so that no bit can flip.
+    * ``force_step_mps2``: a smaller change of the accelerometer's reading, in m/s², is never a
+      spike.
+    * ``full_scale_mps2``: full scale of the accelerometer in m/s². It is infinite if the readings
+      are not integers: the filter then does not look for flipped bits.
     """
 
     fastest_mps: float = 2.0

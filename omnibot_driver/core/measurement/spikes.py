@@ -48,9 +48,8 @@ class Spikes:
     ) -> tuple[bool, bool]:
         """Return whether the last call's values were a spike, and whether the new values leap.
 
-        Leaping values change implausibly much. ``periods``: number of sampling periods since the
-        previous values. ``topmost_bit``: highest bit of the accelerations, in the units of
-        ``values``.
+        Leaping values change implausibly much. ``periods``: sampling periods since the previous
+        values. ``topmost_bit``: highest bit of the accelerations, in the units of ``values``.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False

@@ -62,7 +62,8 @@ _DIRECTIONS: Final = tuple(
 )
 """Directions in which the distance of a velocity from the hull of allowed velocities is computed.
 
-Between two of them, the result is too small by up to 2 %, plus a tenth of the hull's length.
+Between two directions, the computed distance is too small by up to 2 %, plus a tenth of the hull's
+length.
 """
 
 

@@ -225,8 +225,8 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot whose motion does not fit its commands.
 
-        Motion in a set-point's direction, within 60°, is too fast; other motion goes the wrong way.
-        While the heading is unknown, any linear motion is too fast.
+        Motion within 60° of a set-point's direction is too fast; other motion goes the wrong way.
+        With an unknown heading, linear motion is too fast.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

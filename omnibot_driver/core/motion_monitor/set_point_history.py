@@ -27,9 +27,10 @@ HELD_S: Final = 0.3
 This time includes the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant, in s, with which a replaced set-point's velocity decays after ``HELD_S``.
+"""Time constant, in s, with which the velocity that a replaced set-point allows decays.
 
-The value is long enough for robots with a time constant of up to 0.35 s.
+The decay begins after ``HELD_S``. The value is long enough for robots with a time constant of up to
+0.35 s.
 """
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored. At this time, the monitor allows a

@@ -16,8 +16,8 @@ BEGUN_M: Final = 0.005
 BEGUN_RAD: Final = 0.01
 """``BEGUN_M``, ``BEGUN_RAD``: a pose this near to the expected one shows a board's start at zero.
 
-The limits are in m and rad. The expected pose is that after such a start; a robot rarely drives so
-near by chance.
+The limits are in m and rad. The expected pose is that after such a start; a robot rarely stops so
+near.
 """
 
 

@@ -235,7 +235,7 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the pose is in a new frame of the board, which the odometry must adopt.
 
-        ``confirmed``: whether the pose agrees with the last unexpected pose. This decides while no
+        ``confirmed``: whether the pose agrees with the last unexpected pose; the result while no
         frame is known.
         """
         frame = self._frame
@@ -328,7 +328,7 @@ class Odometry:
             tangent = log_of(way)
             self._track.correct(tangent)
             self._bridge.prove(tangent)
-        else:
+        else:  # the board's frame has moved, and not the robot
             self._bridge.prove()
             self.alignments += 1
             self._track.uncertainty.give_up()

@@ -41,10 +41,10 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """Return two tangents in body axes: of all lost displacements together, and of ``reading``.
+        """Return two tangents (twist x time): of all lost displacements, and of ``reading``.
 
-        ``heading_rad``: heading before the losses. If it is None, because no pose has arrived,
-        ``reading`` is assumed to be in body axes.
+        Both are in body axes. ``heading_rad``: heading before the losses; None if no pose has
+        arrived: ``reading`` is then assumed to be in body axes.
         """
         last, self.last = self.last, None
         self.missing, self._only_poses = 0, False

@@ -19,8 +19,8 @@ BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: limits for a pose's deviation, in m and rad.
 
-A pose that deviates more from the expected one must be confirmed by the next. After lost
-displacements, the limits are larger until a pose is accepted.
+A pose that deviates more from the expected one must be confirmed by the next pose. After losses,
+the limits are larger until a pose is accepted.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -82,7 +82,7 @@ class PoseGate:
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
         """Return whether the pose ``told`` confirms ``doubted``, the last unexpected pose.
 
-        In any case, ``doubted`` is then None; if not confirmed, it counts as rejected. ``gap``:
+        Afterwards, ``doubted`` is None. A pose that is not confirmed counts as rejected. ``gap``:
         covariance of the motion lost since the last accepted pose.
         """
         doubted, self.doubted = self.doubted, None

@@ -104,7 +104,7 @@ class CommandEncoder:
         """Return the twist that the last command frame in ``packets`` commands.
 
         The twist is zero for Stop, the emergency stop, and data without a command frame. For a
-        goal, it has no meaning.
+        goal, the twist has no meaning.
         """
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])
