@@ -50,11 +50,8 @@ UNKNOWN_START: Final = 1.0
 After a silence, the first bytes are more likely the beginning of a frame.
 """
 BAD_BYTE: Final = 0.35
-"""Cost of each byte of a run of unexplained bytes, in addition to ``BAD_RUN``.
-
-An IMU frame has 14 bytes. A run of 14 unexplained bytes costs more than any true IMU frame, so the
-search prefers the frame.
-"""
+"""Cost of each byte of a run of unexplained bytes, in addition to ``BAD_RUN``. A run as long as an
+IMU frame costs more than any true IMU frame."""
 BAD_HEADER: Final = 0.5
 """Cost of a header within unexplained bytes. Such a header may arise by chance, or from the values
 of a gyro at rest."""
@@ -67,8 +64,7 @@ fixed bytes of this text hardly arise by chance."""
 KNOWN_GAP: Final = 11.0
 """Cost of a frame that contains a pause, on a line that has paused only between frames so far.
 
-A pause of ``late_reads.IDLE_S`` or longer has this cost on any line. The cost is so high that only
-strong evidence makes the decoder accept such a frame.
+This is also the cost of a frame with a pause of ``late_reads.IDLE_S`` or longer, on any line.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -81,8 +77,7 @@ frame."""
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 """Cost of an IMU frame, by the number of its words that differ much from the previous IMU frame.
 
-A single such word is most likely damaged. A shock changes several words at once, so several such
-words cost only a little more than one.
+A shock changes several words at once, so several such words cost only a little more than one.
 """
 AFTERSHOCK: Final = 1.5
 """Cost of an IMU frame with unusual content that follows another such frame.
@@ -94,8 +89,7 @@ WEIGHTLESS: Final = 2.5
 LOOK_ALIKE: Final = 12.0
 """Cost of an IMU frame whose acceleration is below 0.5 g and contains the bytes of an IMU header.
 
-Such a frame is probably misread. A gyro value of -6 has the same two bytes as the IMU header, so
-the frame seems to begin at this value. The true header is in the supposed acceleration.
+Such a frame probably begins at a gyro value of -6, which has the same two bytes.
 """
 JUMP: Final = 2.5
 """Cost of a frame whose counter did not advance by one. The decoder then assumes that a frame was
@@ -104,10 +98,7 @@ IMPOSSIBLE: Final = 2.0
 """Cost of a movement that a robot with this board cannot make."""
 OFF_BEAT: Final = 1.0
 """Cost of a delta after an unexpected number of IMU frames, or of a pose after an unexpected number
-of deltas.
-
-At 25 Hz, four IMU frames before each delta and five deltas before each pose are expected.
-"""
+of deltas. At 25 Hz, four IMU frames and five deltas are expected."""
 
 CONTRADICTED: Final = 1.5
 """Cost of a pose that contradicts the deltas: the change of its heading is not the sum of the turns
@@ -132,11 +123,8 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which the decoder no longer expects a first delta.
-
-The decoder waits for a first delta at the beginning of a stream, and after damage. The number of
-IMU frames since then shows how many deltas are missing.
-"""
+"""Number of missing deltas after which the decoder no longer expects a first delta. A first delta
+is expected at the beginning of a stream, and after damage."""
 
 
 class Context(NamedTuple):
@@ -186,10 +174,10 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
-        """Limits of an IMU frame's content. Content within all limits has no cost.
+        """Limits in counts, as integers for speed. An IMU frame's content within them has no cost.
 
-        In order: the least and the largest squared acceleration, the largest change of an
-        acceleration word and of a gyro word. All are integers in counts: integers compare faster.
+        In order: least and largest squared acceleration, largest change of an acceleration word and
+        of a gyro word.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
@@ -285,9 +273,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    The result is True only if the byte occurs in headers. For an IMU frame, one of two more
-    conditions must be true: the byte is FF, or the frame's last word differs from the last word of
-    the previous IMU frame.
+    For an IMU frame, the byte must also be FF, or its word must differ from that of the previous
+    IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -63,13 +63,8 @@ class DecoderStatistics:
 class FrameDecoder:
     """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
-    The faster code in ``single_imu`` decodes some frames instead of this class. That code must
-    update these attributes:
-
-    * ``context``: what is known from the frames so far.
-    * ``expectation``: which content the next frame may have.
-    * ``pauses``: where the line was idle.
-    * ``last_arrival_s``: arrival time of the last bytes in s.
+    ``single_imu``, which decodes some frames instead, must update these attributes: ``context``,
+    ``expectation``, ``pauses``, ``last_arrival_s`` and ``statistics``.
     """
 
     def __init__(
@@ -83,11 +78,8 @@ class FrameDecoder:
         self.skipped: list[int] = []
         """Number of discarded bytes right before each frame that ``feed`` or ``flush`` returned."""
         self.at_rest = False
-        """Whether all received bytes are decoded, and the recent pauses were between frames.
-
-        A pause is a time in which the line was idle. If the value is True, the faster code in
-        ``single_imu`` may decode the next bytes.
-        """
+        """Whether a fast path may decode the next bytes. If so, the decoder holds no bytes, and
+        recent pauses of the line were between frames."""
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self.expectation = Expectation(accel_counts_per_g, schedule)
@@ -241,10 +233,9 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept a run of frames (``walk``) except the last two frames; always return False.
+        """Accept the frames of ``walk`` except the last two; always return False.
 
-        The bytes after the run are unusual, so its last two frames are uncertain. The caller
-        ``_walk`` returns this result, because False means that a frame is uncertain.
+        The last two frames are uncertain, because the bytes after them are unusual.
         """
         believed = len(walk.frames) - 2
         if believed > 0:
@@ -301,14 +292,13 @@ class FrameDecoder:
     ) -> Iterator[tuple[Segment, bool]]:
         """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
-        A frame is decided if later bytes cannot change the decision, if it ends at the position
-        ``until`` or before, or if the line is closed. If a closed line has carried only one frame,
-        this frame is trusted if the cost of its content is below ``SPOKEN_AGAINST``.
+        ``until``: frames that end at this position or before are decided in any case.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
         in_step, end = self._in_step, -1
         is_unused = not in_step and self._damaged_at_s == -math.inf  # nothing accepted or discarded
+        # The only frame of a closed line is trusted, except if evidence speaks against it.
         alone = closed and len(pieces) == 1 and pieces[0].start == 0 and is_unused
         if alone:
             cost, _ = self.expectation.weigh(pieces[0].frame, pieces[0].before)

@@ -58,11 +58,9 @@ class Walk:
     No evidence speaks against these frames.
 
     * ``ends``: the position in the bytes after each frame.
-    * ``lessons``: IMU frames from which the decoder learns the usual scatter of the IMU's values.
-      Each entry: number of frames before the IMU frame, the IMU frame itself, and the previous IMU
-      frame.
-    * ``known``: what the decoder knew before some of the frames. Each entry: number of frames
-      before the frame, and the fields of ``Context``.
+    * ``lessons``: for ``Expectation.learn``: number of frames before an IMU frame, this frame, and
+      the previous IMU frame.
+    * ``known``: a number of frames, and the fields of the ``Context`` after them.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -101,11 +99,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
-    A complete frame shows that the unusual content comes from a shock of the robot, not from
-    damage. The result is False if the bytes after the complete frame cannot begin another frame.
-
-    ``held``: the bytes that the decoder holds. ``closed``: whether no more bytes come. If ``at`` is
-    the end of ``held``, the result is ``closed``.
+    If so, the unusual content comes from a shock, not from damage. At the end of ``held``, the
+    result is ``closed``.
     """
     if at == len(held):
         return closed
@@ -124,11 +119,10 @@ def take_run(
     order: ByteOrder,
     walk: Walk,
 ) -> tuple[int, Context]:
-    """Decode the expected frames in ``held``, the first of which begins at ``at``.
+    """Add the expected frames in ``held``, from ``at`` on, to ``walk``.
 
-    Add the decoded frames to ``walk``. Return the end of the last added frame, and what is known
-    after this frame. The last expected frame is not added if its last byte may belong to the next
-    header.
+    Return the position and the context after these frames. The last frame is left out if its last
+    byte may belong to the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

@@ -22,10 +22,8 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    A position in the sequence is the index of the frame that is due next. ``after[kind][at]``: the
-    new position if a frame of ``kind`` arrives at the position ``at``. If a frame of another kind
-    is due at ``at``, all frames that are due before the next frame of ``kind`` are regarded as
-    lost.
+    A position is the index of the frame that is due next. ``after[kind][at]``: the position after a
+    frame of ``kind`` arrives at ``at``; the frames due before it count as lost.
     """
 
     def __init__(self, *kinds: Kind) -> None:
@@ -62,10 +60,8 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record that a frame of ``kind`` arrived; return how many IMU frames were lost before it.
 
-        ``skipped``: number of discarded bytes before the frame.
-
-        For a pose, the result is 0. The IMU frames that were lost before a pose are counted in the
-        result for the next delta or IMU frame.
+        ``skipped``: number of discarded bytes before the frame. For a pose, the result is 0, and a
+        later result contains the losses.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

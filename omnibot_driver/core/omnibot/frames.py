@@ -23,11 +23,8 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""The bytes that occur in frame headers.
-
-If a frame has lost a byte, the decoder takes the first byte of the next header for the frame's last
-byte. So a frame that ends with one of these values may be damaged.
-"""
+"""The bytes that occur in frame headers. If a frame seems to end with one of them, it may have lost
+a byte: its last byte may belong to the next header."""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")

@@ -83,7 +83,7 @@ class InterFrameGaps:
         """Record a read of ``arrived`` bytes, and the pause before it if the line was idle then.
 
         ``pause_s``: time in s since the previous read. ``place``: position of the first new byte
-        among the bytes that the decoder holds. ``now``: time of the read in s.
+        among the held bytes.
         """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
@@ -105,9 +105,8 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Record a pause between frames, before a read that contains only complete frames.
+        """Record a pause between frames, before a read of complete frames, if the line was idle.
 
-        If the line was not idle before the read, there was no pause, and nothing is recorded.
         ``pause_s``: time in s since the previous read. ``arrived``: number of bytes in the read.
         """
         if self.stands_out(pause_s, arrived):
@@ -123,10 +122,7 @@ class InterFrameGaps:
     def compare(self, ends: Sequence[int]) -> None:
         """Learn from accepted frames whether this line's pauses are between frames.
 
-        For each pause, check whether a frame begins in the read after the pause (``between``), and
-        whether the frame begins with the first byte of this read (``sharp``).
-
-        ``ends``: for each accepted frame, the position of its end in the bytes that the decoder
+        ``ends``: the end of each accepted frame, as a position among the bytes that the decoder
         holds.
         """
         start = 0
@@ -148,8 +144,8 @@ class InterFrameGaps:
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
         """Return whether only later bytes can show the cause of a pause in a supposed frame.
 
-        ``data[start:end]``: the supposed frame, which may contain several pauses. If one of these
-        pauses certainly comes from an idle line, the result is False.
+        ``data[start:end]``: the supposed frame. If a pause in it certainly comes from an idle line,
+        the result is False.
         """
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes

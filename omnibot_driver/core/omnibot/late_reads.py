@@ -57,13 +57,12 @@ the pause.
 TICKS_TO_PROVE: Final = 2
 """Number of further late ticks, after a first late tick, that prove that bytes were lost.
 
-Lost bytes make all later ticks seem late by the same time. So each further tick must be as late as
-the first late tick, and must be in a separate read. After a pause of ``IDLE_S`` or more, one
-further tick is enough.
+All must be equally late, each in a separate read. After a pause of ``IDLE_S`` or more, one further
+tick is enough.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Largest number of bytes after a frame that are used to find the cause of a pause in this frame.
-If these bytes do not prove that the line was idle, a late reader is assumed to be the cause."""
+Without a proof in these bytes, a late reader is assumed."""
 
 
 class Cause(Enum):
@@ -92,10 +91,9 @@ _END: Final = attrgetter("end")
 class Gap(NamedTuple):
     """A pause between two reads, caused by an idle line or by a late reader.
 
-    * ``first``, ``before``: range of positions among the bytes that the decoder holds. The first
-      byte after the pause is at one of the positions from ``first`` to ``before`` - 1.
-    * ``price``: cost of an interpretation in which the line was idle and a frame contains the
-      pause.
+    * ``first``, ``before``: the first byte after the pause is at a position from ``first`` to
+      ``before`` - 1 among the held bytes.
+    * ``price``: cost of a frame that contains the pause, if the line was idle.
     * ``pause_s``: time in s between the two reads.
     """
 
@@ -172,18 +170,10 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause within a supposed frame, as shown by the bytes after this frame.
+    """Return the cause of a pause in a supposed frame, as shown by the bytes after this frame.
 
-    * These bytes are not a frame: the line was idle.
-    * These bytes are a frame with a pause that ended a whole number of ticks after the first pause:
-      the line was idle. Each pause ended at the beginning of a tick.
-    * These bytes are a frame with a pause that ended at any other time: the reader was late.
-    * These bytes are a frame without a pause: the reader was late.
-
-    The result is UNDECIDED while the next frame is incomplete.
-
-    ``start``: position of the next frame. ``first``: the read that ended the pause in the earlier
-    frame.
+    The result is UNDECIDED while the next frame, at ``start``, is incomplete. ``first``: the read
+    that ended the pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:
@@ -192,6 +182,7 @@ def _by_the_next_frame(
     for before, after in pairwise(reads):
         pause_s = after.now - before.now - (after.end - before.end) * byte_s
         if start < before.end < end and pause_s > GAP_S:
+            # After an idle line, both pauses end at the beginning of a tick.
             ticks_s = after.now - first.now
             punctual = abs(remainder(ticks_s, TICK_S)) < PACE_S
             return Cause.IDLE_LINE if punctual else Cause.LATE_READER

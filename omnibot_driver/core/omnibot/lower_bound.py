@@ -32,8 +32,8 @@ The cost of 15 bytes is a little below ``DAMAGE``, the cost of a damaged frame.
 def least_costs(data: bytes) -> list[float]:
     """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    The bound is consistent: along an edge of the graph, it decreases by at most the edge's cost. An
-    incomplete last frame costs 0.
+    The bound is consistent: along an edge, it decreases by at most the edge's cost. An incomplete
+    last frame costs 0.
     """
     size = len(data)
     ends = _undamaged(data)
@@ -62,11 +62,9 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return the end of each row of undamaged frames.
+    """Return the end of each row of consecutive undamaged frames, by the start of the row.
 
-    In a row, each frame begins where the previous frame ends. The keys are the positions where an
-    undamaged frame may start, in descending order. Each value is the position where the row that
-    starts at the key ends.
+    The starts are all positions where an undamaged frame may start, in descending order.
     """
     size = len(data)
     ends: dict[int, int] = {}

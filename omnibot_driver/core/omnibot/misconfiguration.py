@@ -29,20 +29,18 @@ POSE_PERIODS: Final = 2
 the value 2, the pose between them may be lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).
+"""``CLEARLY_M`` (in m), ``TIMES``: limits for the check of ``delta_frame``.
 
-The check adds up the deltas twice: as if they were in the earth frame, and as if they were in the
-body frame. The error of a sum is its distance from the board's pose. The pose contradicts the
-configured frame if the error in this frame is above ``CLEARLY_M``, and above ``TIMES`` times the
-error in the other frame.
+A pose contradicts this setting if the summed deltas miss the pose by more than ``CLEARLY_M``, and
+by more than ``TIMES`` times the error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
 """``FEWEST_DELTAS``, ``FOR_S`` (in s): limits for the advice to change ``delta_period``.
 
-The driver gives the advice if deltas show a period that differs from the configured one. At least
-``FEWEST_DELTAS`` deltas in a row must show the same period, for at least ``FOR_S``.
+At least ``FEWEST_DELTAS`` deltas in a row must show the same period, other than the configured one,
+for at least ``FOR_S``.
 """
 RATE_TOLERANCE: Final = 0.1
 
@@ -79,10 +77,10 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """Check the configured period of the deltas. Called for each delta.
+        """Check the configured period of the deltas with a new delta.
 
-        ``imus``: number of IMU frames since the previous delta. This number shows the period, and
-        the arrival times must confirm it. ``now``: arrival time of the delta in s.
+        ``imus``: number of IMU frames since the previous delta, which shows the period. ``now``:
+        arrival time of the new delta in s.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:

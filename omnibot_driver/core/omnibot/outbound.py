@@ -26,18 +26,16 @@ MAX_WORD: Final = 32767
 ZEROS: Final = bytes(8)
 """The zeros that are sent before Stop, the emergency stop or a letter.
 
-* They complete a previous frame that has lost its end. Seven zeros are enough; the eighth is sent
-  because one of the zeros may be lost, too.
-* They wake a board. Three zeros are enough for this.
+* Seven zeros complete a previous frame that has lost its end; the eighth is a reserve.
+* Three zeros wake a board.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-If the previous frame has lost its end, the zeros may complete it to a wrong command. The board
-obeys this command until the motion frame arrives. After four zeros, the motion frame arrives sooner
-than after the eight of ``ZEROS``.
+The zeros may complete a damaged previous frame to a wrong command. The fewer zeros, the sooner the
+motion frame replaces this command.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

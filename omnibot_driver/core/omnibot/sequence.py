@@ -16,29 +16,20 @@ from omnibot_driver.core.values import value
 
 WRAP: Final = 256
 
+# With a full buffer on the host, and every tenth byte lost, an arrival time is wrong by up to
+# 0.24 s.
 LATE_S: Final = 0.5
-"""Limit, in s, for the difference between two measures of the time from one delta to the next.
+"""Limit, in s, for the difference between measured and counted time from delta to delta.
 
-The measures are the difference of the arrival times, and the difference of the counters times the
-period. If they differ by more than the limit, the board may have restarted. The limit grows with
-the elapsed time, because the board's clock drifts (``DRIFT``).
-
-An arrival time can be wrong by up to 0.24 s, if the host's buffer is full and every tenth byte is
-lost. The limit is larger than this error.
+Beyond the limit, the board may have restarted. Keep the limit above 0.24 s, the largest error of an
+arrival time.
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and of times that are computed from its counters.
-
-After minutes of silence, this error is so large that the counter cannot show a restart. Only the
-board's pose can then prove a restart.
-"""
+After minutes of silence, only the board's pose can therefore prove a restart."""
 EARLY_S: Final = 0.2
-"""Tolerance, in s, of the check whether a counter began at zero after the last delta.
-
-If the counter began at zero, its count times the period is at most the time since the last delta
-was read, plus this tolerance. The driver may have read the last delta very late, so the tolerance
-is needed.
-"""
+"""Tolerance, in s, of the check whether a counter began at zero after the last delta. If the last
+delta was read late, the time since this delta seems too short."""
 LONG_GAP_S: Final = 1.0
 """Longest gap before a pose, in s, after which this pose can still show a restart of the board. The
 pose is compared with the last delta, which is too old after a longer gap."""
@@ -50,11 +41,9 @@ class Step:
 
     * ``lost``: number of missing deltas that were not reported before.
     * ``duration_s``: time that the delta covers; None if unknown.
-    * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
-      it.
-    * ``doubtful``: whether ``restarted`` is True, but a restart is improbable: after a pause of the
-      board, because a restart would mean more lost deltas than a continued count; after a silence,
-      because the new count is the last count plus 1.
+    * ``restarted``: whether the counter seems to have restarted, which only the board's pose can
+      prove.
+    * ``doubtful``: whether ``restarted`` is True although a continued count is more likely.
     """
 
     lost: int
@@ -85,20 +74,14 @@ class Sequence:
         """
         self._paused = self._reconnected = False
         self._ahead: int | None = None
-        """Counter of the last delta, if it was too high for the elapsed time; else None.
-
-        Such a counter may be damaged. If the next delta continues it, it was right. Until then, the
-        number of lost deltas is computed from the elapsed time.
-        """
+        """Counter of the last delta, if it was too high for the elapsed time; else None. Such a
+        counter may be damaged; the next delta shows whether it was right."""
         self.ambiguous = False
         """Whether the counters at the last pose have two explanations: a restart of the board in
         the gap before this pose, or a loss of all deltas in this gap."""
         self._may_be_new = False
-        """Whether the board may have restarted in a gap since the last pose.
-
-        True if deltas were lost in the gap, and the count of the delta after the gap is low enough
-        for a restart. The value stays True until the next pose, even over a pause or a
-        reconnection."""
+        """Whether the board may have restarted in a gap since the last pose. If so, deltas were
+        lost in the gap, and the count after the gap is low enough for a restart."""
         self._left: tuple[int, float, int] | None = None
         """What is needed to withdraw a supposed restart: the last counter before it, the arrival
         time of this counter in s, and the first counter after the restart."""
@@ -106,13 +89,7 @@ class Sequence:
     def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.
 
-        The duration of the pause is unknown, so only the next delta can show a restart. If this
-        delta does not continue the count, the driver decides as follows:
-
-        * If the board sends poses, the driver supposes a restart even if the new count is high,
-          because the first deltas after a restart may be lost. A pose can disprove the restart.
-        * Without poses, nothing can disprove a restart. The driver supposes a restart only if the
-          new count is low.
+        Only the next delta can show which.
         """
         self._paused, self._pose = True, None
 
@@ -138,6 +115,10 @@ class Sequence:
             return Step(0, None if paused else period_s)
         lost = (count - before - 1) % WRAP
         if paused:
+            # The duration of the pause is unknown. If poses can disprove a restart, every jump of
+            # the count is regarded as a restart, because the first deltas after it may be lost.
+            # Without poses, only a low count is. A restart is doubtful if it would mean more lost
+            # deltas than a continued count.
             anew = lost > 0 or count == 0 if self._regular else count <= lost
             return Step(0, None, restarted=anew, doubtful=anew and lost < count)
         wraps = max(0, round((elapsed_s / period_s - lost - 1) / WRAP))
@@ -173,9 +154,8 @@ class Sequence:
     def pose(self, count: int, now: float) -> Step:
         """Return what the counter of a new pose shows about lost deltas and about a restart.
 
-        ``now``: arrival time of the pose in s.
-
-        In the result, ``lost`` is the number of missing deltas. The pose contains their motion.
+        ``now``: arrival time in s. ``lost`` in the result: number of missing deltas, whose motion
+        the pose contains.
         """
         may_be_new, self._may_be_new, self.ambiguous = self._may_be_new, False, False
         if may_be_new and self._delta is not None:
@@ -217,7 +197,7 @@ class Sequence:
         """Return whether the counters of poses and deltas can have begun at zero together.
 
         ``count``, ``delta``: the counters of a new pose and of the last delta. ``elapsed_s``: time
-        since the previous pose in s. If it is long enough, ``delta`` may have wrapped meanwhile.
+        since the previous pose.
         """
         passed = count * self._per_pose
         wraps = max(0, round((passed - delta) / WRAP))

@@ -32,13 +32,12 @@ def is_begun(
 ) -> bool:
     """Return whether ``pieces`` and ``data`` together are the beginning of a due IMU frame.
 
-    ``pieces``: the earlier reads of this frame; may be empty. ``data``: the newest read.
-
-    If ``GAP_S`` or more has passed since the first piece, there was a pause within the frame. Only
-    the decoder can judge such a pause, so the result is then False.
+    ``pieces``: earlier reads of this frame, if any. ``data``: the newest read. The result is False
+    if ``GAP_S`` has passed since the first piece.
     """
     if pieces:
         data = joined(pieces) + data
+        # Only the decoder can judge a pause within a frame.
         prompt = now - pieces[0][1] < GAP_S
     else:
         prompt = (
@@ -59,10 +58,8 @@ def take_pieces(
 ) -> ImuReading | None:
     """Return the reading of the IMU frame that consists of ``pieces`` and ``data``.
 
-    ``pieces``: the earlier reads of this frame, at least one. ``data``: the newest read.
-
-    Return None and change nothing if the frame is not accepted, if a byte may be lost, or if
-    ``GAP_S`` has passed since the first piece.
+    Return None and change nothing if only the decoder can judge the frame. ``pieces``: the earlier
+    reads, at least one. ``data``: the newest read.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
@@ -88,14 +85,10 @@ def take_single(
     *,
     first: int = IMU_LENGTH,
 ) -> ImuReading | None:
-    """Return the reading of ``data`` if it is exactly one IMU frame that is due and looks usual.
+    """Return the reading of one usual, due IMU frame; else return None and change nothing.
 
-    Otherwise return None and change nothing. ``data`` may have come in several reads (pieces).
-
-    ``first``: number of bytes in the first piece. ``now``: arrival time of the first piece in s.
-
-    If ``data`` came in pieces, the caller must first make sure that its last byte does not belong
-    to the next header.
+    ``first``, ``now``: length and arrival time of the first piece. With more pieces, the last byte
+    must not begin the next header.
     """
     pause_s = now - decoder.last_arrival_s
     if (

@@ -34,26 +34,19 @@ from omnibot_driver.core.readings import (
 
 DELTA_LSB: Final = 1e-4
 """Size of one count of a delta, in m or rad: 0.1 mm or 0.1 mrad."""
+# The board sends one text a second, and the driver waits less than 10 s for the result of a reset.
 MOST_TEXTS_LOST: Final = 9
 """Largest number of "Paused" texts that can have been lost since the last received one.
 
-The counter in the texts shows how many were lost. The board sends one text a second, and the driver
-waits less than 10 s for the result of a reset. If the counter shows more lost texts, it has begun
-again, because the board has restarted.
+If the counter in the texts shows more, the counter has begun again, because the board has
+restarted.
 """
 FULL: Final = 4000
-"""If a read has at least this number of bytes, the driver assumes that the kernel's buffer of 4 KiB
-was full.
-
-The number is below 4096, because bytes that the decoder keeps for later, such as an incomplete
-frame, are not counted.
-"""
+"""If a read has at least this number of bytes, the kernel's buffer of 4 KiB was probably full. The
+number is below 4096, because bytes that the decoder keeps for later are not counted."""
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
-
-The next read is late if the board needs a longer time to send the bytes of this read than twice the
-time since the previous read, plus ``BURST_S``.
-"""
+``BURST_S``: tolerance of this check, in s."""
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
 """Shortest delay of a read, in s, for which the driver corrects arrival times. A shorter delay may
@@ -96,12 +89,9 @@ class Translation:
         """Delay of the last read in s: the time from the sending of its last byte to the read."""
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
-        """Return the readings of the frames that were completed by one read at the time ``now``.
+        """Return the readings of the frames ``found``, which one read at ``now`` completed.
 
-        ``found``: the completed frames. ``skipped``: number of discarded bytes before each frame.
-
-        Bytes arrive one by one, so the arrival time of a frame is estimated from its place in the
-        read.
+        ``skipped``: number of discarded bytes before each frame.
         """
         self._catch_up()
         lengths = [LENGTH.get(type(frame), 0) for frame in found]
@@ -122,12 +112,11 @@ class Translation:
     def _sent_s(self, count: int, now: float) -> float:
         """Return when the board sent the last of the ``count`` bytes that were read at ``now``.
 
-        If the read was not late, the result is ``now``. If it was late, the board sent these bytes
-        directly after those of the previous read, so ``count`` shows how long the sending took.
-        This is true even if the kernel's buffer was full: the buffer keeps its bytes, and loses
-        only later bytes.
+        If the read was late, the board sent them directly after those of the previous read.
+        Otherwise, the result is ``now``.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
+        # A full buffer keeps its bytes and loses only later ones, so ``count`` is right then, too.
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S
         sent_s = self.heard_s - self._behind_s + duration_s
         return sent_s if waited and -math.inf < sent_s < now - LEAST_S else now

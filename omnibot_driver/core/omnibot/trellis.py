@@ -28,11 +28,8 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""Cost difference that makes a frame sure. Each interpretation that reads the frame's first byte in
-another way must cost at least this much more than the cheapest one.
-
-Each of these interpretations is then at least 30 times less likely.
-"""
+"""Cost difference that makes a frame sure. Every other interpretation of the frame's first byte
+costs at least this much more, and is at least 30 times less likely."""
 STEP: Final = 5.5
 """First cost limit of the search, as a distance above the lower bound of the cost.
 
@@ -93,11 +90,8 @@ class Segment:
 
 
 _Edge = tuple[int, int, float, Frame | None, Context | None]
-"""An edge of the graph: its start node, end node and cost, its frame, and what is known after this
-frame.
-
-The frame and what is known after it are None if the edge is not a complete frame.
-"""
+"""An edge of the graph: start node, end node, cost, frame, and context after the frame. Frame and
+context are None if the edge is not a complete frame."""
 
 
 def read(
