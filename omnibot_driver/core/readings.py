@@ -58,12 +58,9 @@ class DisplacementReading:
     * ``lost``: number of missing displacements directly before this one.
     * ``restarted``: whether the board's counters and its earth frame seem to begin anew with this
       displacement.
-    * ``doubtful``: whether ``restarted`` may be wrong, because a few lost displacements, or a late
-      one, would also explain the counters. The restart is then not counted.
-    * ``measured``: False if the values are not a valid measurement, e.g. if the board only reports
-      the commanded values.
-    * ``possible``: False if the robot cannot move so fast. The cause may be a correction of the
-      board's own odometry.
+    * ``doubtful``: whether ``restarted`` may be wrong; the restart is then not counted.
+    * ``measured``: False if the values are not a measurement, but e.g. only the commanded values.
+    * ``possible``: False if the robot cannot move so fast, e.g. if the board corrects its odometry.
     * ``up_s``: time in s from the restart of the board to this displacement; infinity if unknown.
     """
 
@@ -90,12 +87,11 @@ class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
     * ``lost``: number of lost displacements whose motion this pose includes. The next
-      DisplacementReading does not count these displacements in its ``lost``.
+      DisplacementReading does not count them in its ``lost``.
     * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame. A
       displacement before it may have shown the same restart.
-    * ``ambiguous``: whether the counters have two explanations: a restart of the board in a gap
-      before this pose, or a loss of all displacements in this gap. Only the position and heading of
-      this pose can show which explanation is true.
+    * ``ambiguous``: whether the counters fit both a restart of the board in a gap before this pose,
+      and the loss of all displacements in this gap.
     """
 
     x_m: float
@@ -194,13 +190,13 @@ Reading = (
 class SampleBoundary:
     """Place in the stream of IMU samples at which a read of the port ended.
 
-    * ``ahead``: 1 if the last sample, or its first part, has arrived but was not returned as an
+    * ``ahead``: 1 if the last sample has arrived, at least in part, but was not returned as an
       ImuReading yet; else 0.
-    * ``cut``: whether the end of this sample is missing. Such a sample is called a cut sample.
-    * ``latest_s``: latest time at which the cut sample can be complete, in s after the read. It is
-      0 without a cut sample.
-    * ``earliest_s``: earliest time at which the cut sample can be complete, in s after the read.
-      Without a cut sample, it is the earliest time at which the next sample can be complete.
+    * ``cut``: whether the end of this sample is missing.
+    * ``latest_s``: latest time in s after the read at which the cut sample can be complete; 0
+      without a cut sample.
+    * ``earliest_s``: earliest time in s after the read at which the cut sample can be complete, or
+      the next sample if none is cut.
     """
 
     ahead: int

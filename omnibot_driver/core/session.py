@@ -131,11 +131,10 @@ class Session:
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
         """Apply new settings to later commands and frames.
 
-        If a limit or timeout becomes stricter, the robot is stopped, except while it drives to a
-        goal. If the scale of the odometry changes, the current goal is dropped.
-
-        ``board``: new settings of the board itself; None if they stay the same. The current command
-        is encoded again with the new settings of the board. If this fails, the robot is stopped.
+        * A stricter limit or timeout stops the robot, except while it drives to a goal.
+        * A new scale of the odometry drops the current goal.
+        * ``board``: new settings of the board itself; None if unchanged. If the current command
+          cannot be encoded with them, the robot is stopped.
         """
         self._reporter.notify(self._commanding.configure(settings, now))
         if board is not None:
@@ -228,9 +227,8 @@ class Session:
     def end_goal(self, now: float) -> None:
         """End a drive to a goal or a docking, because a zero ``cmd_vel`` was refused.
 
-        These motions have no ``cmd_vel_timeout``, so even a zero command that is refused, e.g. as
-        too old, must end them. A commanded velocity stays in effect: it expires by itself, and may
-        be newer than the zero ``cmd_vel``.
+        These motions have no ``cmd_vel_timeout``. A commanded velocity stays in effect, because it
+        may be newer than the refused command.
         """
         self._reporter.notify(self._commanding.end_goal(now))
 

@@ -56,8 +56,7 @@ class Shutdown:
     def fall_silent(self, now: float) -> bool:
         """End the repetition of Stop, and demand a new proof that the robot stands still.
 
-        The new proof shows that the last Stop was not damaged on the line. If no proof is possible,
-        or if the e-stop is latched, this method changes nothing and returns False.
+        Return False, and change nothing, if no proof is possible or the e-stop is latched.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
             return False

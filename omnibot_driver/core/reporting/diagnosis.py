@@ -19,17 +19,13 @@ from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
-"""Limit for the mean delay of reads, in s. The driver reports late reads if the mean delay is
-larger. An adapter that delivers bytes every 10 ms has a mean delay of exactly this limit, so its
-reads are not reported."""
+"""Limit for the mean delay of reads, in s, above which the driver reports late reads. An adapter
+that delivers bytes every 10 ms has exactly this mean delay."""
 LARGEST_SKEW_PPM: Final = 115.0
 """Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0
-"""The driver reports a clock skew above ``LARGEST_SKEW_PPM`` that lasts longer than this time in s.
-
-The clock skew is the estimated difference of the clocks' rates. A busy computer delays reads, which
-disturbs the estimate for this time at most. So a skew that lasts longer is real.
-"""
+"""Time in s after which the driver reports a clock skew above ``LARGEST_SKEW_PPM``. Late reads of a
+busy computer disturb the estimate of the skew for this time at most."""
 
 BUSY_SHARE: Final = 0.1
 """Share of time, from 0 to 1. If the reader thread waits for the processor for a larger share of

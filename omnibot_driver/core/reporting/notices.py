@@ -78,9 +78,8 @@ class Notices:
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
         """Return notices of lost frames and rejected readings that were not reported before.
 
-        All counts are totals since the driver began. ``lost``: lost odometry frames.
-
-        ``overruns``: how often the serial port overran, so that the computer lost bytes.
+        All counts are totals since the driver began. ``lost``: odometry frames. ``overruns``:
+        overruns of the serial port, each with lost bytes.
         """
         news = []
         if overruns != self._overruns:

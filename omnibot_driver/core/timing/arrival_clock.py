@@ -18,8 +18,7 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time. Each stamp is later than the stamp before it.
 
-    If two reads come almost at the same time, the stamps of the later read can be a little later
-    than its arrival time. In all other cases, no stamp is later than the arrival time.
+    A stamp is later than the arrival time only if two reads came almost at the same time.
     """
 
     skew_ppm = 0.0

@@ -20,19 +20,17 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-An adapter with a timer delays each read until the timer expires. If the timer's period is wrong by
-100 ppm, these delays drift, and reach their smallest value every 20 s. The blocks cover a longer
-time, so they contain the smallest delay.
+The blocks must cover more than 20 s: with an adapter's timer that is wrong by 100 ppm, the smallest
+delay occurs every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm plus a margin
 of 20 ppm."""
 SUPPORT: Final = 0.75
-"""Selects the edge of a convex hull that is used as the fitted clock.
+"""Selects the edge of a convex hull that serves as the fitted clock without lower bounds.
 
-Without lower bounds, the fitted clock is one edge of the lower convex hull of the kept upper
-bounds. The value is the position of this edge in the hull's time span, 0 to 1. With a later edge,
-the clock follows recent points more closely, but jitter affects the clock more.
+The value is the edge's position in time, 0 to 1. A larger value follows recent points more closely,
+with more jitter.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -42,12 +40,8 @@ LATE_PART: Final = 0.1
 ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Limit for the distance between two bounds of the fitted clock, as a fraction of a tick's period.
-
-Each block of ticks gives an upper and a lower bound. If their distance is larger than the limit,
-the lower bound is not used. With an adapter's 16 ms timer, the distance is less than 2 ms, which is
-a fifth of a 10 ms tick.
-"""
+"""Largest distance between the two bounds of a block of ticks, in periods of a tick. Beyond it, the
+lower bound is not used. An adapter's 16 ms timer causes a distance below 0.2 (2 ms)."""
 
 Point = tuple[int, float]
 """The number of a tick, and an upper or lower bound of its time, in s."""
@@ -77,10 +71,8 @@ class ClockFit:
     def see(self, latest: Point, *, cut: bool) -> None:
         """Add an upper bound of a tick's time.
 
-        ``latest``: number of the tick, and a time in s by which the tick had arrived. The tick is
-        the newest one that a read contains.
-
-        ``cut``: whether the read ended in the middle of this tick's sample.
+        ``latest``: number of the newest tick in a read, and a time in s by which this tick had
+        arrived. ``cut``: whether the read ended within its sample.
         """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor

@@ -29,17 +29,11 @@ LARGEST_LOSS_TICKS: Final = 25
 If more ticks are missing, the clock is restarted.
 """
 BEAT_READS: Final = 12
-"""Number of consecutive reads that certainly include a read with little delay.
-
-An adapter with a timer of 16 ms reads at five phases of a 10 ms tick (0, 6, 2, 8 and 4 ms), each
-with its own delay. 12 reads contain each phase twice, so also the phase with the least delay.
-"""
+"""Number of consecutive reads that certainly include a read with little delay. An adapter with a
+timer of 16 ms reads at five phases of a 10 ms tick; 12 reads contain each phase twice."""
 CALM: Final = 0.45
-"""Largest distance of a read's arrival from the fitted clock, in periods, for the fast path.
-
-The previous read must also be within this distance. Keep the value below 0.5: half-way between two
-ticks, it is uncertain to which tick a read belongs.
-"""
+"""Largest distance of the last two reads from the fitted clock, in periods, for the fast path. Keep
+the value below 0.5: half-way between two ticks, a read's tick is uncertain."""
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period.
 
@@ -77,26 +71,23 @@ class DeviceClock:
         self._calm: ClockFit | None = None
         """The fitted clock if the fast path may be used; None if not.
 
-        The fast path may be used if ``BEAT_READS`` reads have arrived. The last read must have
-        ended with a complete sample, near the time that the fitted clock predicts.
+        The fast path needs ``BEAT_READS`` earlier reads, and a last read that ended on time with a
+        complete sample.
         """
         self._single_reads = 0
         """How many reads in a row, up to the last one, brought exactly one sample."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
         self._seen_at = -math.inf
-        """Time in s of the last read that brought a new tick.
-
-        If the next new tick is read less than half a period later, the earlier of the two reads was
-        late, because the board's ticks are a whole period apart.
-        """
+        """Time in s of the last read that brought a new tick. If the next new tick is read less
+        than half a period later, the last read was late."""
         self._awaited: Point | None = None
         """Number of the next tick, and the earliest time in s at which the last byte of its sample
         can arrive."""
         self._cut_off: Point | None = None
-        """The sample that the last read cut off, as a pair; None if the read cut off no sample.
+        """The sample that the last read cut off; None if no sample was cut off.
 
-        The pair: the number of the sample's tick, and the earliest time in s at which the sample
-        can be complete. The clock uses the pair only if the rest of the sample arrives.
+        The pair: number of the sample's tick, and the earliest time in s at which the sample can be
+        complete.
         """
 
     @property
@@ -108,14 +99,10 @@ class DeviceClock:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the sampling time in s of each reading.
+        """Return the sampling time in s of each reading. A displacement has the stamp of its tick.
 
-        ``now``: time in s at which the last bytes of the readings were read.
-
-        Stamps increase from tick to tick, and are not later than ``now``. A displacement has the
-        stamp of its tick.
-
-        ``edge``: position of the end of the read, relative to the board's samples; None if unknown.
+        Stamps increase from tick to tick, and are not later than the read at ``now``. ``edge``:
+        None if unknown.
         """
         if self._stamped_tick is None and now - self._seen_at > self._longest_loss_s:
             self.restart()  # only a part of a sample has arrived, long ago
@@ -184,9 +171,8 @@ class DeviceClock:
     def _count(self, readings: Sequence[Reading]) -> list[int]:
         """Return the tick number of each reading.
 
-        Lost readings are counted, too. The board's own counter in a displacement also gives the
-        number of ticks that have passed. If this number differs from the count, the tick number is
-        corrected.
+        Lost readings are counted, too. The board's own counter in a displacement corrects the tick
+        number.
         """
         ticks: list[int] = []
         for reading in readings:
@@ -203,8 +189,8 @@ class DeviceClock:
     def _missing(self, reading: DisplacementReading) -> int:
         """Return how many ticks to add to the tick number, as a displacement's counter shows.
 
-        The result is negative if the tick number is too high. It is 0 if there is no earlier
-        displacement, or if the new displacement has no duration.
+        The result is negative if the tick number is too high, and 0 without an earlier displacement
+        or a duration.
         """
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
@@ -215,12 +201,8 @@ class DeviceClock:
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
         """Compare the newest arrival with the fitted clock, and correct the tick count.
 
-        Return the correction in ticks. It is positive if the count was too low because of lost
-        ticks.
-
-        ``counted``: whether this read contains a displacement. If ``counted`` is True, or if all
-        recent arrivals were late, the last displacement came after the lost ticks. The
-        displacement's tick number is then corrected too.
+        Return the correction in ticks, positive after lost ticks. ``counted``: whether this read
+        contains a displacement, whose tick number is then corrected, too.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -242,6 +224,7 @@ class DeviceClock:
             ):
                 short = 1  # a larger jump is more likely a delay than a loss
             elif min(lags_s) > period_s / 2:
+                # All recent arrivals are late: the last displacement came after the lost ticks.
                 short, counted = round(min(lags_s) / period_s), True
                 lags_s.clear()
         if short > LARGEST_LOSS_TICKS:
@@ -267,10 +250,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record the delay of a new tick, and the time ``now`` at which the tick was read.
 
-        ``lag_s``: the delay in s. It is the tick's arrival minus its time by the fitted clock.
-
-        If the previous tick was read less than half a period before ``now``, the read of the
-        previous tick was late. So the new delay replaces the delay of the previous tick.
+        ``lag_s``: arrival minus the time by the fitted clock. If the previous tick was read late,
+        this delay replaces its delay.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -285,13 +266,8 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set a tick's stamp by the fitted clock, but limit the step from the last stamp.
 
-        ``latest_s``: latest allowed stamp, in s.
-
-        ``room_s``: step in s with which the remaining stamps of this read fit evenly between the
-        last stamp and the read.
-
-        The step is at least half a period, or ``room_s`` if that is shorter, but never less than
-        ``SMALLEST_STEP_S``.
+        ``latest_s``: latest allowed stamp, in s. ``room_s``: step in s that spreads this read's
+        remaining stamps evenly.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
