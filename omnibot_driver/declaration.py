@@ -31,8 +31,8 @@ KNOWN_TYPES: Final = frozenset(kind.value for kind in rclpy.Parameter.Type)
 def declare(node: Node) -> dict[str, Any]:
     """Declare all parameters on the node, and return their values at the driver's start.
 
-    If the user and the calibration file both give a value, the one in the calibration file is used.
-    Raises ParameterError for a wrong value.
+    Values in the calibration file override those of the user. Raises ParameterError for a wrong
+    value.
     """
     given = {
         name: override.value
@@ -55,9 +55,8 @@ def declare(node: Node) -> dict[str, Any]:
 def set_each(node: Node, request: Any, response: Any) -> Any:
     """Serve rcl_interfaces/SetParameters: set each parameter that is valid.
 
-    This function replaces rclpy's own callback for two reasons. First, for a value of an unknown
-    type, that callback raises an exception, which would end the driver. Second, its answer for an
-    unknown parameter name does not say what is wrong.
+    This function replaces rclpy's own callback, in which a value of an unknown type raises an
+    exception that would end the driver.
     """
     response.results = [_set(node, [message]) for message in request.parameters]
     return response
@@ -77,6 +76,7 @@ def _set(node: Node, messages: Sequence[Any]) -> SetParametersResult:
             reason = f"the value of parameter '{message.name}' has no type that ROS knows"
             return SetParametersResult(successful=False, reason=f"{reason}; correct the sender")
         if not node.has_parameter(message.name):
+            # rclpy's own answer does not say what is wrong.
             try:
                 boards.check_all({"board": node.get_parameter("board").value, message.name: None})
             except ParameterError as error:

@@ -56,9 +56,8 @@ HINTS: Final = {
 class Ending:
     """The event that ends the driver: a signal, or a call of ``begin``.
 
-    The main thread waits for it. Signals write to a pipe, because signal handlers must not use
-    locks.
-    ``defect``: the exception that ended the driver, or None.
+    Signals write to a pipe, because signal handlers must not use locks. ``defect``: the exception
+    that ended the driver, or None.
     """
 
     def __init__(self) -> None:
@@ -92,8 +91,7 @@ class Ending:
 def main(args: list[str] | None = None) -> int:
     """Run the driver until it must end, and return the exit code.
 
-    The exit code is 0 after a normal end, 1 after a defect, and 2 if the driver cannot start. The
-    main thread must only wait, so that a second signal does not interrupt the shutdown.
+    The exit code is 0 after a normal end, 1 after a defect, and 2 if the driver cannot start.
     """
     args = sys.argv if args is None else args
     fill_gaps()
@@ -195,6 +193,7 @@ def _run(ending: Ending, args: list[str]) -> None:
         except BaseException as error:  # SystemExit too: without the executor no callback would run
             driver.report_defect(error)
 
+    # The main thread must only wait, so that a second signal does not interrupt the shutdown.
     spinner = threading.Thread(target=spin, name="omnibot-executor", daemon=True)
     spinner.start()
     ending.wait()
@@ -213,8 +212,7 @@ def _run(ending: Ending, args: list[str]) -> None:
 def _set_deadline() -> None:
     """End the process by force if the shutdown takes longer than 5 s (``LONGEST_END_S``).
 
-    The guard process then stops the robot. If the thread for this deadline cannot be started, the
-    shutdown goes on without a deadline, because it must still stop the robot.
+    The guard process then stops the robot.
     """
 
     def give_up() -> None:
@@ -227,6 +225,7 @@ def _set_deadline() -> None:
 
     deadline = threading.Timer(LONGEST_END_S, give_up)
     deadline.daemon = True
+    # If no thread can be started, the shutdown goes on: it must still stop the robot.
     with contextlib.suppress(RuntimeError):
         deadline.start()
 

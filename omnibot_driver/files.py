@@ -19,16 +19,12 @@ CHECK_FOLDER: Final = "check that the folder in `record_directory` can be writte
 def write_whole(
     path: Path, write: Callable[[TextIO], object], *, wanted: Callable[[], bool] = lambda: True
 ) -> bool:
-    """Write a text file in UTF-8, and create its folder if needed.
+    """Write a text file in UTF-8 and create its folder; return whether ``path`` was written.
 
-    The content is written to a temporary file, which then replaces the file ``path``. Return
-    whether ``path`` was replaced or created. Raises OSError.
+    * ``write``: writes the content to the open file, which does not convert line ends.
+    * ``wanted``: called after ``write``; if it returns False, ``path`` stays as it was.
 
-    ``write``: function that writes the content to the open temporary file. Line ends are not
-    converted.
-
-    ``wanted``: function that is called before the replacement. If it returns False, the temporary
-    file is deleted, and an existing file ``path`` stays as it was.
+    Raises OSError; ``path`` then stays as it was.
     """
     import tempfile  # takes 1 MB, and few drivers ever write a file
 

@@ -86,11 +86,8 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 def speak(last_words: Words, until: list[int], drop: bool) -> None:
     """Write the packets of ``last_words`` to their lines, 20 times.
 
-    Return early if all lines are lost.
-
-    * ``until``: descriptors of the driver's messages. A message also ends the function, because the
-      driver runs again.
-    * ``drop``: whether to first discard output that the lines have not sent yet.
+    Return early if all lines are lost, or if a message comes from ``until``: the driver then runs
+    again. ``drop``: whether to first discard unsent output.
     """
     lines = {line for line, _ in last_words}
     for line in lines if drop else ():

@@ -34,9 +34,8 @@ UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, if no guard can repeat Stop after the shutdown. The driver waits
 for a proof that the robot is at rest. For a slow board, the limit is larger."""
 SILENCE_S: Final = 0.25
-"""Longest wait at shutdown, in s, for the second proof that the robot is at rest. This proof comes
-after the last Stop, and shows that the line did not damage this Stop: a damaged Stop could move the
-robot. For a slow board, the limit is larger."""
+"""Longest wait at shutdown, in s, for the second proof that the robot is at rest. This proof shows
+that the line did not damage the last Stop. For a slow board, the limit is larger."""
 BOTH_PROOFS_S: Final = 2.4
 """Longest total time at shutdown, in s, for the two proofs that the robot is at rest. The guard
 needs the remaining part of ``driver.LONGEST_END_S`` to repeat Stop."""
@@ -150,9 +149,8 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        If the port is already lost, the reader thread opens it once more to send Stop.
-
-        Returns whether this call sent Stop and ended the threads.
+        A lost port is opened once more to send Stop. Returns whether this call sent Stop and ended
+        the threads.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:

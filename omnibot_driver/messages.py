@@ -43,9 +43,8 @@ rad, and rates in rad/s (empty if unknown)."""
 class MessageSettings:
     """What messages contain besides measurements: frame names, standard deviations and wheels.
 
-    Frame names begin with the parameter ``frame_prefix``. The standard deviations of measured
-    values are in SI units; a value for which the board has no such parameter has the standard
-    deviation 0.
+    Frame names begin with the parameter ``frame_prefix``. Standard deviations are in SI units, and
+    0 if the board has no such parameter.
     """
 
     odom_frame: str
@@ -192,9 +191,8 @@ def time_message(nanoseconds: int) -> Time:
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
     """Return wall clock minus steady clock, in ns.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. So the difference
-    of the clocks is known only within limits. The result is the value within these limits that is
-    nearest to ``known_ns``, the previous result.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. Of the possible
+    values, the result is the nearest to ``known_ns``, the previous result.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -181,8 +181,7 @@ class Reader:
     def _process(self, now: float) -> None:
         """Let the session process the bytes that it has decoded with ``hear``.
 
-        The reader has already delivered the IMU estimates that ``hear`` returned. The processing
-        can result in a command to the board. The caller holds the lock.
+        The processing can result in a command to the board. The caller holds the lock.
         """
         if self._session.inbound.process(now):
             self._shared.settle()

@@ -30,8 +30,8 @@ from omnibot_driver.replay import Replay
 async def ask(link: Any, question: Callable[[Session, Future, float], None], response: Any) -> Any:
     """Ask the session a question, wait for the answer, and return it in ``response``.
 
-    ``question``: a function that gets the session, the token of the request and the time in s. It
-    raises RequestRefused with the reason if the request is refused.
+    ``question``: gets the session, the token of the request and the time in s, and raises
+    RequestRefused with the reason for a refusal.
     """
     answer = Future()
     try:

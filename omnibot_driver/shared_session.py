@@ -58,11 +58,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the link wrote its last Stop to every line.
-
-        If the port was lost, the reader opens it again and writes Stop. This Stop counts only if
-        the robot has not been proved to stand still (``Shutdown.owed`` is True).
-        """
+        """Whether the link wrote its last Stop to every line. A Stop on a lost port that was opened
+        again counts only if ``Shutdown.owed`` is True."""
         self.stood = False
         """Whether the robot was known to stand still when the link ended. Stop was written to every
         line, and measurements showed the robot at rest after the last motion command."""
@@ -100,12 +97,11 @@ class SharedSession:
 
         * ``sent_ns``: times of day, in ns, at which the command may have been sent: two if the
           sender's clock is uncertain, none for a command to stop, otherwise one.
-        * ``moves_base``: whether the command moves the base. If such a command is refused, the
-          motion interlock records the refusal.
+        * ``moves_base``: whether the command moves the base, so that the motion interlock records a
+          refusal.
 
-        Raises CommandRefused if ``action`` refuses the command, or if the command may have been
-        sent before or during a recent stall of this process. The constructor's ``refused`` then
-        receives the reason, unless the queue of events is full.
+        Raises CommandRefused if ``action`` does, or if the command may have been sent before or
+        during a recent stall of this process. The constructor's ``refused`` receives the reason.
         """
         try:
             with self.lock:

@@ -33,10 +33,7 @@ ROW_EVERY_S: Final = 1.0
 
 
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
-    """Run the demo with this board.
-
-    The robot drives for ``seconds``. The demo ends earlier if ``asked_to_end`` returns True, or if
-    the user quits the monitor.
+    """Run the demo: drive for ``seconds``, or until ``asked_to_end`` or the user ends the demo.
 
     Raises ParameterError for an unknown board, ImportError without ROS, and DemoFailed if the demo
     cannot continue.

@@ -31,10 +31,8 @@ def status_row(
 ) -> str:
     """Return a row of the table under ``HEADING``: state, rates, lap, pose and velocities.
 
-    ``rates_hz``: rate of the IMU (None without an IMU) and rate of the odometry.
-
-    ``leg``: number of completed sides of the square, over all laps. ``velocities``: the commanded
-    twist and the measured twist, in this order.
+    ``rates_hz``: IMU (None without one) and odometry. ``leg``: number of completed sides of the
+    square, over all laps. ``velocities``: commanded and measured.
     """
     imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]

@@ -21,8 +21,7 @@ class DemoFailed(Exception):
 class Program:
     """A module of this package that the demo runs as a child process.
 
-    Ctrl-C does not reach the child process. The method ``end`` ends it. If the demo ends without a
-    call of ``end``, the kernel ends the child process.
+    Ctrl-C does not end the child process: ``end`` does, or the kernel when the demo ends.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:

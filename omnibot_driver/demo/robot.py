@@ -37,11 +37,8 @@ when its driver has run for a while."""
 class Robot:
     """A ROS node that observes and steers the demo's robot through the driver's topics.
 
-    After every second odometry message, the node publishes a velocity on ``cmd_vel``. ``driving``:
-    whether this velocity drives the square; otherwise the velocity is zero. ``leg``: how many sides
-    of the square are complete.
-
-    Raises DemoFailed if ROS does not start.
+    ``driving``: whether the commanded velocity drives the square; otherwise it is zero. ``leg``:
+    number of completed sides. Raises DemoFailed if ROS does not start.
     """
 
     def __init__(self, namespace: str, *, imu: bool = True, sideways: bool = True) -> None:

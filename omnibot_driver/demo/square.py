@@ -27,10 +27,9 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the current leg, and the velocity to command in the robot's own axes.
+    """Return the current leg, and the velocity to command, for a robot that can drive sideways.
 
-    The robot must be able to drive sideways. On each even leg it also turns 90° to the left, and on
-    each odd leg it turns back.
+    On each even leg, the robot also turns 90° to the left, and turns back on each odd leg.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD

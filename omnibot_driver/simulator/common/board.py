@@ -19,8 +19,8 @@ class Channel:
     """One connection between a board and the computer.
 
     * ``name``: empty if the board has only one channel.
-    * ``parameter``: the driver's parameter for this port. Empty if the driver derives this port:
-      it is the UDP port after that of the previous channel.
+    * ``parameter``: the driver's parameter for this port; empty if this is the UDP port after that
+      of the previous channel.
     * ``datagrams``: whether the channel carries UDP datagrams instead of serial bytes.
     """
 
