@@ -18,11 +18,8 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 class Terminal:
     """A new pseudo-terminal. The driver opens ``address``, the simulator uses ``descriptor``.
 
-    While ``UNREAD_LIMIT`` bytes are unread, further bytes are lost.
-
-    ``link``: path of a symbolic link to make. An existing link is replaced only if it is dead or
-    leads to a pseudo-terminal. Raises OSError if the link cannot be made (FileExistsError if the
-    path is taken).
+    ``link``: path of a symbolic link to make. It replaces only a dead link or a link to a
+    pseudo-terminal. Raises OSError if the link cannot be made.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:

@@ -23,9 +23,8 @@ class DriveConfig:
     """Configuration of the drive Teensy.
 
     * ``wheel_base_m``: distance between the driving wheels, for the odometry.
-    * ``confs_m``: two distances for the control of turns, the manual's B and F. B is a second value
-      for the distance between the driving wheels. F is the distance from the axle to the steered
-      wheel.
+    * ``confs_m``: the manual's B (distance between the driving wheels) and F (distance from the
+      axle to the steered wheel), for the control of turns.
     """
 
     number: int

@@ -34,8 +34,7 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     * ``diagnosis``, ``error_flags``: status bits of the ``fwl`` line, without the frame counter.
     * ``frozen``: the sensor repeats its last angle.
-    * ``absent``: no sensor answers; the Teensy reports the angle 0 and the status bits of a sensor
-      that has not finished its first measurement.
+    * ``absent``: no sensor answers, and the Teensy reports the angle 0.
     """
 
     version = 100
@@ -143,6 +142,7 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     def _angle(self) -> str:
         frames, self._frames = self._frames, self._frames + 1
+        # An absent sensor looks like a sensor that has not finished its first measurement.
         healthy = self.diagnosis & ~0x2 if self.absent else self.diagnosis
         noise = self.settings.angle_noise_deg
         shown = self._measured_deg
@@ -205,8 +205,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     def _remote_control(self, rest: str) -> None:
         """Set the angle that the wheel must reach: ``atan2(F w, v)``, limited to ±90°.
 
-        ``v``, ``w``: commanded speed and turn rate. If the robot must drive backward and the
-        firmware is "mirrored", both are negated first. ``F``: distance from the axle to the front
+        ``v``, ``w``: commanded speed and turn rate. ``F``: distance from the axle to the front
         wheel.
         """
         _, v, turn_dps = wire.padded(rest, 3)

@@ -67,8 +67,7 @@ class FejemisSettings:
     * ``slip``: standard deviation, in m, of the distance error of a wheel that rolls 1 m.
     * ``ticks``: encoder ticks per revolution of the motor.
     * ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
-    * ``servo_degps``: speed of the servo at the full command, 1000. With the default, the crossover
-      frequency of the manual's controller is 12 rad/s.
+    * ``servo_degps``: speed of the servo at the full command, 1000.
     * ``sensor_zero_deg``: zero offset of the angle sensor, which the factory configuration
       corrects.
     * ``clock_ppm``, ``ids``: for the drive and the front Teensy, the error of the clock's rate in
@@ -90,6 +89,7 @@ class FejemisSettings:
     gear: float = 19.0
     ticks: int = 68
     steer_base_m: float = 0.42
+    # With this speed, the crossover frequency of the manual's controller is 12 rad/s.
     servo_degps: float = 164.0
     servo_lag_s: float = 0.039
     sensor_zero_deg: float = 0.0

@@ -154,15 +154,11 @@ def wheel_speeds(
 ) -> tuple[float, float]:
     """Return the speeds of the left and the right wheel in m/s, with the equations of the manual.
 
-    * Outer wheel: ``v2 = sqrt(v² + w²)`` with the sign of ``v``.
-    * Inner wheel: ``v1 = v2 - v2 B / d``, with ``d = max(f / tan(theta) + B / 2, B / 4)``.
-
-    ``v``: speed in m/s. ``w``: turn rate in rad/s; the manual adds the squares of ``v`` and ``w``
-    although their units differ. ``theta``: angle of the front wheel. ``B``: ``base_m``. ``f``:
-    ``steer_m``.
+    ``angle_deg``: angle of the front wheel. ``base_m``, ``steer_m``: the manual's B and f.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0
+    # The manual adds the squares of m/s and rad/s, although these units differ.
     outer = copysign((speed**2 + turn_radps**2) ** 0.5, speed if speed else 1.0)
     theta = abs(angle_deg) * pi / 180.0
     if theta < 1e-6:

@@ -2,9 +2,8 @@
 
 """Reads and writes lines of text as a Teensy does, according to the manual and public programs.
 
-The checksum ``;NN`` stands at the beginning of a line. It depends on the sum of the codes of all
-characters after it, except control characters (below 0x20). The checksum is this sum modulo 99,
-plus 1. Numbers are parsed as by C's ``strtof``. This module must not know commands.
+The checksum ``;NN`` stands at the beginning of a line. Numbers are parsed as by C's ``strtof``.
+This module must not know commands.
 """
 
 import re

@@ -117,8 +117,8 @@ class Encoder:
     def turn(self, turns: float) -> list[tuple[float, bool, int]]:
         """Turn the disc. Return the edges that passed the sensor, in order.
 
-        An edge is a tuple of three values: its time, as a fraction of the step; whether the level
-        that ended at this edge was a long one; and its direction, 1 forward or -1 backward.
+        An edge has a time, as a fraction of the step; whether a long level ended; and a direction,
+        1 forward or -1 backward.
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
@@ -169,10 +169,10 @@ class Gains:
 
 
 class SpeedController:
-    """The board's speed controller. It calculates a duty from the measured and the target RPM.
+    """The board's speed controller, from measured and target RPM to a duty in percent.
 
-    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised by the trapezoidal rule. The rule assumes
-    steps of ``NOMINAL_STEP_S``, even if the true steps differ.
+    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised by the trapezoidal rule for steps of
+    ``NOMINAL_STEP_S``, even if the true steps differ.
     """
 
     def __init__(self, gains: Gains) -> None:

@@ -18,8 +18,7 @@ class DocumentedOdometry:
     """Odometry from signed ticks and measured speeds, as the manual describes it.
 
     * ``pose``: x and y in m, and yaw in rad.
-    * ``velocity``: in m/s, m/s and rad/s, along the fixed axes of x and y, not along those of the
-      robot.
+    * ``velocity``: in m/s, m/s and rad/s, along the fixed axes, not the robot's axes.
     """
 
     def __init__(self, steps: int, radius_m: float, track_m: float) -> None:

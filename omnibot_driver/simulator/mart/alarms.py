@@ -187,9 +187,8 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels, in units of the motor registers; forward is positive.
 
-    * A wheel that would exceed full speed (128 units forward, 127 backward) gets full speed, and
-      the other wheel becomes slower by the excess.
-    * A wheel that would change its direction stops.
+    A wheel beyond full speed gets full speed, and the other wheel loses the excess. A wheel that
+    would change its direction stops.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

@@ -11,8 +11,8 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    * ``alive``: whether the IMU is plugged in, as set by the caller. The failure of the IMU at
-      ``MartSettings.imu_dies_s`` does not change this value.
+    * ``alive``: whether the IMU is plugged in, as set by the caller. ``MartSettings.imu_dies_s``
+      does not change this value.
     * ``closed``: whether the server has stopped using the IMU (until RST IMU or SB succeeds).
     * ``rate_dps``: last turn rate in degrees/s, minus the bias that the server knows.
     * ``heading_deg``: the relative heading in degrees, positive to the left.

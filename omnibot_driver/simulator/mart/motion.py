@@ -56,8 +56,7 @@ class Motion:
 
     * ``running``: whether the motion is in progress; the server then refuses other motions.
     * ``watching``: whether the module ``alarms`` supervises the motion.
-    * ``posts``: number of kept reports. A report says that a motion has started or ended. It is
-      kept until a port waits for it.
+    * ``posts``: number of reports of a start or an end that no port has waited for yet.
     * ``right``, ``left``: motor registers, as the server knows them.
     * ``sampled_s``: time of the last sample of the IMU, or -1.
     * ``moved_s``, ``turned_s``: first and last time at which the right wheel turned.

@@ -2,10 +2,8 @@
 
 """The start of each kind of motion, and its end by a command.
 
-A start or an end has several steps, each of which is a function. The server calls each function
-with itself as the first argument. So if a test makes a second server with ``MartServer.copy``, the
-second server can continue a motion that the first has begun. This module does not know the words of
-commands.
+Each step takes the server as an argument, so a copy of the server (``MartServer.copy``) can
+continue a motion. This module does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING

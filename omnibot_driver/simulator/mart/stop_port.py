@@ -35,11 +35,8 @@ def obey(server: "MartServer", text: str) -> None:
 def end_motion(server: "MartServer", motion: Motion) -> bool:
     """Stop a drive (F, B, RM) or a spin (R, L). Return whether to wait for the end of the motion.
 
-    The result is True if this call stops the motion. In three cases, the call stops nothing:
-
-    * A spin is already stopping. The result is False.
-    * A drive is already stopping. The result is True.
-    * A drive is not stopping, and the module ``alarms`` no longer watches it. The result is False.
+    No motor is stopped if the motion is already stopping, or if ``alarms`` no longer watches the
+    drive.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

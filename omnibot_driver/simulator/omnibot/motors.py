@@ -23,12 +23,12 @@ STICKING_SPEED = 0.3
 class MotorConstants:
     """Properties of one motor.
 
-    * ``pwm_per_count``: effort in PWM steps for a speed of one count per tick. The manual's
-      feed-forward of 40 is seven eighths of the default.
+    * ``pwm_per_count``: effort in PWM steps for a speed of one count per tick.
     * ``time_constant_ticks``: time constant of the speed.
     * ``delay_ticks``: delay from an effort to its effect.
     """
 
+    # The manual's feed-forward of 40 is about seven eighths of this value.
     pwm_per_count: float = 46.0
     time_constant_ticks: float = 6.0
     friction_pwm: float = 40.0
@@ -103,9 +103,6 @@ class WheelController:
     """The manual's PI controller (Wheel control). The feed-forward Kff v(k) is not accumulated.
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
-
-    While the PWM is at its limit, the integral term changes only if this moves the PWM away from
-    the limit.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:
@@ -122,6 +119,7 @@ class WheelController:
         self._feedback += gains.proportional * (error - self._last_error)
         self._last_error = error
         effort = gains.feed_forward * target + self._feedback
+        # At the limit of the PWM, the integral term may only move the PWM away from the limit.
         if abs(effort) < PWM_LIMIT or effort * error < 0:
             self._feedback += gains.integral * error
             effort += gains.integral * error
