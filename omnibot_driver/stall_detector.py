@@ -32,7 +32,7 @@ def boot_time_ns() -> int:
 
 
 class StallDetector:
-    """A detector of stalls: whether this process is stalled now, and when the last stall ended.
+    """A detector of stalls of this process.
 
     The pacer thread calls ``passed`` at least ten times a second. Other threads call ``begun``
     before they use the session, and stop the robot after a stall.

@@ -19,10 +19,10 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, between late messages. After a longer pause, a new series begins.
+"""Longest pause, in s, between two late messages of a series.
 
-If a series of late messages lasts ``HEALS_AFTER_S`` (s), the sender's clock may have been set back,
-so the driver estimates the offset of this clock anew.
+After a series that lasts ``HEALS_AFTER_S`` (s), the driver estimates the offset of the sender's
+clock anew.
 """
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
@@ -35,16 +35,12 @@ NTP can shift a clock gradually by ``LARGEST_CORRECTION_S`` (s) in addition, but
 a larger error.
 """
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which an early message fits its sender worse than a message that is equally late.
-
-The misfit of a late message is the time by which it is late. The misfit of an early message is
-``CLOCK_RETREATS`` times the time by which it is early.
-"""
+"""Factor by which an early message fits its sender worse than a message that is equally late."""
 ALIKE_S: Final = 0.02
 """Largest difference, in s, at which the misfits of two senders are regarded as equal.
 
-A misfit (``_Sender.misfit_s``) says how badly the time of a message fits a sender. If several
-senders fit equally well, the driver chooses the sender whose last message had the highest number.
+If several senders fit equally well, the driver chooses the sender whose last message had the
+highest number.
 """
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
@@ -78,9 +74,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: possible times of day at which the message was sent. The first is an estimate by
-      our clock. While the offset of the sender's clock is unknown, the second is the time by the
-      sender's clock.
+    * ``sent_ns``: possible times of day at which the message was sent: an estimate by our clock
+      and, while the offset of the sender's clock is unknown, the time by the sender's clock.
     """
 
     total_s: float
@@ -173,10 +168,8 @@ class _Sender:
     def misfit_s(self, differences_s: Differences, at_s: float) -> tuple[float, float]:
         """Return how badly a message fits this sender: least and largest possible misfit in s.
 
-        The offset of the sender gives the expected arrival of the message. If the message is later,
-        the misfit is the time by which it is too late. If the message is earlier, the misfit is ten
-        times (``CLOCK_RETREATS``) the time by which it is too early. The drift of the clocks makes
-        the misfit uncertain.
+        The misfit is the time by which the message is late, or ``CLOCK_RETREATS`` times the time by
+        which it is early.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)
