@@ -23,8 +23,7 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
     """Run the subcommand that the command line names.
 
-    * ``argv``: the arguments after the program's name; default: those of this process.
-    * ``read``: asks the user a question and returns the answer.
+    ``read``: asks the user a question and returns the answer.
 
     Returns the exit code: 0 success, 1 failure, 2 wrong usage, 130 interrupted.
     """

@@ -28,9 +28,9 @@ REQUESTS: Final = 3
 """Number of times that the tool sends a request that may be repeated. The middleware drops an
 answer if the driver discovers the new client too late."""
 SPIN_S: Final = 0.005
-"""Time, in s, for which each call of the executor waits. All calls use the same time, because rclpy
-begins its round of callbacks again after a change of the time. On a busy computer, the round would
-then never come to the messages of the e-stop."""
+"""Time, in s, for which each call of the executor waits. After a change of this time, rclpy begins
+its round of callbacks again. With changes in each call, a busy computer would never process the
+e-stop's messages."""
 
 
 class Client:

@@ -228,8 +228,7 @@ class Walk:
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
         """Run a motion, and return in which direction the user saw each wheel turn.
 
-        The result has a number for each of the wheels A, B and C: 1 counter-clockwise, -1
-        clockwise, 0 still. The user can first request the motion again.
+        For each of the wheels A, B and C: 1 counter-clockwise, -1 clockwise, 0 still.
         """
         while True:
             self._console.say(f"\n{what}:")

@@ -129,8 +129,8 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    A known uncertainty below 10 has two significant digits, and both values have the same number of
-    decimals as the uncertainty. If the uncertainty is 10 or more, all three are whole numbers.
+    A known uncertainty has two significant digits, or is a whole number from 10 on. Both values
+    have as many decimals.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

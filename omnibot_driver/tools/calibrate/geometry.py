@@ -22,9 +22,8 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""Limit for the difference between a wheel's radius and the mean radius of all wheels, as a
-fraction of the mean. The tool warns if the difference is above this limit, and above three standard
-deviations of the difference."""
+"""Limit for the deviation of a wheel's radius from the mean radius, as a fraction of the mean. The
+tool warns of a larger deviation if it also exceeds three of its standard deviations."""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark the"
     " floor under the robot's centre (use a plumb line, or a fixed point of the lowest deck), and"
@@ -189,8 +188,8 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first error is for the driver's current geometry. The second error is for the geometry
-    ``found``, but with its mean wheel radius for all wheels.
+    The first error is for the driver's current geometry. The second is for ``found``, with its mean
+    wheel radius for all wheels.
     """
     before: list[float] = []
     after: list[float] = []

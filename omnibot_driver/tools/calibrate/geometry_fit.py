@@ -81,8 +81,7 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
     ``drift``: standard deviation, in m, that slip causes in a wheel's distance of 1 m.
 
-    Raises ToolError if the fit fails, or if the mean wheel radius or the base radius differs from
-    the assumed one by more than 20 % (``UNKNOWN``).
+    Raises ToolError if the fit fails, or changes a size by more than 20 % (``UNKNOWN``).
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -115,15 +114,14 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
     """Return the path that the same wheel angles give with other radii, from the origin, (n, 3).
 
     * ``path``: poses that were computed with the assumed radii.
-    * ``factors``: new / assumed radius of each wheel. The shape is (3,) if the factors are the same
-      for all steps, otherwise (n - 1, 3).
+    * ``factors``: new / assumed radius of each wheel, (3,) or, for each step, (n - 1, 3).
     * ``base``: new / assumed base radius.
     """
     return _rolled(rims_of(path, base_radius_m), factors, base * base_radius_m)
 
 
 def _rolled(rims: Column, factors: Column, base_radius_m: float) -> Column:
-    """Return the poses of a path from the origin, (n, 3): the origin, then one pose for each step.
+    """Return the poses of a path that begins at the origin, (n, 3).
 
     ``rims``: distance that each wheel rolls in each step, by the assumed radii, in m, (n - 1, 3).
     """

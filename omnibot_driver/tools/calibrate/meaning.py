@@ -20,13 +20,12 @@ STANDS_PART: Final = 0.1
 """Largest fraction of the commanded speed at which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""Limit for the ratio of the robot's speeds in the second and in the first half of a drive. If the
-second speed divided by the first is at most this limit, the robot is regarded as stopping."""
+"""Limit for the speed in the second half of a drive, divided by the speed in the first half. Up to
+this limit, the robot is regarded as stopping."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 """Limits for the speed of a drive with twice the command, divided by the speed of the first drive.
 
-``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: largest value for which
-the speed is regarded as unchanged.
+The speed is regarded as doubled within ``DOUBLED``, and as unchanged up to ``UNCHANGED``.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.

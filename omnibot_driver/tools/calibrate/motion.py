@@ -19,10 +19,9 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A control law: a function that returns the command, or None to end the motion.
+"""A function that returns the command, in the units of its topic, or None to end the motion.
 
-Arguments: time in s since the start, and pose relative to the start, with unwrapped yaw. Commands
-of ``cmd_vel`` are in m/s, m/s and rad/s, those of ``wheel_cmd`` in rad/s.
+Arguments: time in s since the start, and pose relative to the start, with unwrapped yaw.
 """
 
 LOOK_S: Final = 1.0
@@ -50,12 +49,13 @@ For ``cmd_vel``: linear speed in m/s and yaw rate in rad/s. For ``wheel_cmd``: r
 class Bounds:
     """Limits of one motion, for the topic ``cmd_vel`` or ``wheel_cmd``.
 
-    * ``speed``, ``turning``: largest commands, in m/s and rad/s. For ``wheel_cmd``, ``speed`` is a
-      wheel rate in rad/s, and ``turning`` has no effect.
+    * ``speed``, ``turning``: largest commands, in m/s and rad/s.
     * ``way``, ``turn``: largest distance and turn from the start, by the odometry, in m and rad.
     * ``seconds``: longest duration.
-    * ``acceleration``, ``angular_acceleration``: in m/s² and rad/s²; infinity: no ramp. For
-      ``wheel_cmd``, ``acceleration`` is in rad/s².
+    * ``acceleration``, ``angular_acceleration``: in m/s² and rad/s²; infinity: no ramp.
+
+    For ``wheel_cmd``, ``speed`` and ``acceleration`` are those of a wheel, in rad/s and rad/s².
+    ``turning`` has no effect.
     """
 
     speed: float
@@ -127,12 +127,10 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Add the motion since the last call, and check at intervals that the robot moves.
+        """Add the motion in the last ``seconds``, and check at intervals that the robot moves.
 
-        ``seconds``: time since the last call. ``measured``: velocity, in the units of ``command``.
-
-        Raises ToolError if the measured motion in an interval is less than a fifth of the commanded
-        motion. Commands slower than ``PLAIN`` are not checked.
+        ``measured``: velocity, in the units of ``command``. Raises ToolError if the robot moves
+        less than a fifth of a command above ``PLAIN``.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

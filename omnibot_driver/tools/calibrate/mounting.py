@@ -96,8 +96,8 @@ def bias(imu: Imu) -> Array:
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     """Return the mounting from the upward direction in three postures.
 
-    The arguments are unit vectors in the sensor's axes. Raises Contradiction if a tilt is too small
-    or too large, or if the tilts are not about 90° apart.
+    Arguments: unit vectors in the sensor's axes. Raises Contradiction if a tilt is too small or too
+    large, or if the tilts are not about 90° apart.
     """
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)

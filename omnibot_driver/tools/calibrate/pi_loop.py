@@ -82,12 +82,11 @@ def answer(
     """Return the speed of a wheel, in RPM, after a step of the set-point from standstill.
 
     The first dimension of the result is time, in steps of 1 ms. The other dimensions are the common
-    shape of the gains, ``dead_s``, ``begun`` and ``sent_s``.
+    shape of the gains and the arguments below.
 
     * ``dead_s``: dead time in s; None: that of ``loop``.
     * ``begun``: initial position of the wheel between two encoder ticks, 0 to 1.
-    * ``sent_s``: time in s at which the board first sends its tick counts; None: it never sends.
-      While the board sends, it notices encoder ticks late.
+    * ``sent_s``: time in s at which the board first sends its tick counts; None: never.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(

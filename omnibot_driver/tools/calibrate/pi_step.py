@@ -43,14 +43,12 @@ times, because the board does not acknowledge settings."""
 
 QUIET_S: Final = 0.5
 """Period, in s, with which the board sends its tick counts during a record. It is long, because the
-board can miss encoder ticks while it sends. If the user has not set ``ticks_period``, the tool does
-not change the board's own period, because it could not restore that period."""
+board can miss encoder ticks while it sends."""
 RATE_SHOWN: Final = "Odometry rate (Hz)"
 """Name in /diagnostics of the rate at which the board sends its ticks.
 
-The value has the form "measured of expected". The expected rate comes from ``ticks_period``. If the
-user has not set ``ticks_period``, the driver derives the expected rate from the period that it has
-measured.
+The value has the form "measured of expected". If ``ticks_period`` is not set, the driver derives
+the expected rate from measurements.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""
@@ -159,6 +157,7 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
         LEAST_DEAD_S,
         sends_each_s=_sends_each_s(bench.robot),
     )
+    # Without ``ticks_period``, the tool could not restore the board's own period.
     quiet = {"ticks_period": QUIET_S} if bench.robot.parameters["ticks_period"] else {}
     bench.set({"drive_mode": "rpm", "record_samples": arguments.samples, **quiet})
     was = bench.steps([FIRST_RPM] * 2)

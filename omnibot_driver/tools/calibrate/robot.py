@@ -99,9 +99,7 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot by the control law ``law``, within ``bounds``, and stop it.
-
-        Return the log.
+        """Move the robot by ``law`` within ``bounds``, stop it, and return the log.
 
         * ``obeys``: whether to raise an error if the robot does not move.
         * ``monitored``: whether the driver's motion monitor stays on. It must be off until speed
@@ -140,8 +138,8 @@ class Robot(Listener):
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
         """Let the driver record the response to ``command``; return the path of the record's file.
 
-        The robot must be at rest. Raises ToolError on an e-stop, lost data, or a failure in the
-        driver. Other nodes' commands are not noticed.
+        The robot must be at rest. Other nodes' commands are not noticed. Raises ToolError on an
+        e-stop, lost data, or a failure.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)

@@ -161,8 +161,7 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 def _way(pose: Column, axis: int) -> Column:
     """Return, for each pose, the coordinate along an axis of the robot, or the yaw.
 
-    ``axis``: 0 for the robot's x axis, 1 for its y axis, 2 for the yaw. Both axes are those of a
-    robot with the mean heading of all poses.
+    ``axis``: 0 for x, 1 for y, 2 for the yaw. The axes are those at the robot's mean heading.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -49,8 +49,7 @@ class Step:
     * ``before_radps``, ``after_radps``: commanded rates.
     * ``end_ticks``: end of each odometry delta, in ticks after the onset.
     * ``rate_radps``: mean rate in each odometry delta, which lasts four ticks.
-    * ``last_radps``: commanded rate before the previous step. The effect of the previous step may
-      continue.
+    * ``last_radps``: commanded rate before the previous step, whose effect may continue.
     * ``last_ticks``: time from the previous onset to this onset.
     """
 
@@ -68,8 +67,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: the model's response to a unit step. This function takes the ends of the deltas,
-        in ticks after the step, and returns the mean rate in each delta.
+        ``mean``: a function from the ends of the deltas, in ticks after a unit step, to the model's
+        mean rates.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps

@@ -67,9 +67,9 @@ def first_order(parameters: Array, time_s: Array) -> Array:
 def second_order(parameters: Array, time_s: Array) -> Array:
     """Return the angle turned after a unit step, by a transfer function of second order.
 
-    (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²), with the zero Z of a PI loop with feed-forward.
-    ``parameters``: ω in rad/s, ζ, Z and L in s.
+    (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). ``parameters``: ω in rad/s, ζ, Z and L in s.
     """
+    # The zero comes from a PI loop with feed-forward.
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
     root = root if abs(root) > 1e-4 else 1e-4  # two close poles replace two equal poles

@@ -16,9 +16,8 @@ QUANTUM_RADPS: Final = 0.05
 """Standard deviation, in rad/s, of the rate of an odometry delta, due to quantisation by the
 encoder and the protocol's unit of 0.1 mm."""
 MANY: Final = 1.5
-"""Limit for the ratio of the residuals to the quantisation error. The tool warns if the ratio is
-larger. A busy computer, for example, may delay commands: the residuals are then doubled, and the
-tool finds a delay of the wheel that is 4 ms too long."""
+"""Ratio of the residuals to the quantisation error above which the tool warns. A busy computer that
+delays commands, for example, doubles the residuals."""
 UNEXPLAINED: Final = 1.2
 """Residual of the motor model, divided by the residual of the second-order model, above which the
 motor model is regarded as wrong."""

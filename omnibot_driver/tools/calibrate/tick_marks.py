@@ -85,12 +85,10 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the number of the mark at which a record begins.
+    """Return the number of the mark from which a record fits ``steps`` best.
 
-    From this mark on, ``row`` fits ``steps`` best.
-
-    * ``row``: relative errors of the record's times between ticks.
-    * ``steps``: relative errors of the distances from each mark to the next.
+    ``row``: relative errors of the record's times between ticks. ``steps``: relative errors of the
+    distances from each mark to the next.
     """
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
@@ -103,15 +101,13 @@ def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
 
     * ``rows``: for each record, the relative errors of its times between ticks.
     * ``firsts``: for each record, the number of its first mark.
-
-    All times from the same mark to the next cover the same distance. The error of this distance is
-    the median of the errors of these times, minus the mean of all medians.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]
     )
     off = np.concatenate(list(rows))
     of, off = of[np.isfinite(off)], off[np.isfinite(off)]
+    # All times from the same mark to the next cover the same distance.
     steps = np.array(
         [np.median(off[of == mark]) if np.any(of == mark) else 0.0 for mark in range(marks)]
     )

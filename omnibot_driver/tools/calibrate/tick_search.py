@@ -45,16 +45,8 @@ LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered. The
 slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
-"""Limit for the sum of the relative errors of two successive intervals between encoder ticks.
-
-The board has missed a mark of the encoder in the first interval if the sum is above this limit, and
-the error of the first interval is above half of this limit.
-
-* If the board has missed a mark, the first interval is twice as long as expected. So the sum is
-  about 1, or smaller if the board's clock loses up to 6 ms.
-* If the board has noticed a mark late, the first interval is too long, and the second is too short
-  by the same amount. So the sum is near 0.
-"""
+"""Limit for the sum of the relative errors of two successive intervals between encoder ticks. The
+sum is larger if the board has missed a mark in the first interval."""
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record that are not searched for missed marks, because the
 wheel is still so slow that the board notices every mark."""
@@ -159,11 +151,13 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        If the board missed a mark between two ticks, the time between these ticks covers two
-        distances between marks. All later searches take this into account.
+        In all later searches, a time over a missed mark covers two distances between marks.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
+            # If the board missed a mark, the interval is twice as long as expected, so ``both`` is
+            # about 1, or smaller if the board's clock loses up to 6 ms. If the board noticed a mark
+            # late, the next interval is too short by the same amount, so ``both`` is near 0.
             both = row + np.append(row[1:], 0.0)
             missed = (row > MISSED / 2) & (both > MISSED)
             missed[1:] &= ~missed[:-1]
@@ -292,8 +286,8 @@ class Search:
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the times between ticks that ``values`` predict, in s, record after record.
 
-        ``off``: for each mark on the encoder's disc, the offset from its evenly spaced position, in
-        ticks. None: the offsets in ``values``, or those of an earlier fit if ``values`` has none.
+        ``off``: offset of each mark from its evenly spaced position, in ticks. None: the offsets in
+        ``values`` or of an earlier fit.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)

@@ -40,18 +40,13 @@ class Behaviour:
 
     Each value is a number, or an array with one element for each candidate of the gains.
 
-    ``rise_s``: rise time, from 10 % to 90 % of a step of the command.
-
-    ``overshoot``: as a fraction of the step.
-
-    ``command_error_s``: integral of the absolute error after a step of the command by 1.
-
-    ``load_error_s``: integral of the absolute error after a step of the load. The step is as large
-    as the motor effort that turns the wheel at one count per tick.
-
-    ``ms``: peak of the sensitivity; 1 is best.
-
-    ``stable``: whether the errors have decayed at the end of the simulation.
+    * ``rise_s``: rise time, from 10 % to 90 % of a step of the command.
+    * ``overshoot``: as a fraction of the step.
+    * ``command_error_s``: integral of the absolute error after a step of the command by 1.
+    * ``load_error_s``: the same after a step of the load as large as the effort for one count per
+      tick.
+    * ``ms``: peak of the sensitivity; 1 is best.
+    * ``stable``: whether the errors have decayed at the end of the simulation.
     """
 
     rise_s: Array
@@ -83,8 +78,8 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
-    ``now``: the present gains. The errors of a candidate are divided by the errors with ``now``.
-    Raises ToolError if no gains are within the limits.
+    ``now``: the present gains, whose errors are the reference. Raises ToolError if no gains are
+    within the limits.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)

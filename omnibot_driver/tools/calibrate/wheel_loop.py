@@ -107,8 +107,8 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     def way(share: float) -> float:
         """Return how many counts the wheel turns in ``share`` ticks if it starts from rest.
 
-        ``share``: a number of ticks, 0 to 3, not necessarily whole. The motor's effort is constant,
-        and leads to a final speed of one count per tick.
+        ``share``: 0 to 3, not necessarily whole. The effort is constant, and its final speed is one
+        count per tick.
         """
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 

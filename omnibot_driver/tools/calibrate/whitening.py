@@ -15,13 +15,10 @@ Column = NDArray[np.float64]
 
 
 def correlation(rows: Sequence[Column], lags: int) -> Column:
-    """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
+    """Return a robust estimate of the residuals' autocorrelation, for lags up to ``lags``.
 
-    ``rows``: rows of successive residuals.
-
-    * If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 to 0. It is -0.5 if
-      all errors come from displaced encoder marks, and 0 if all errors are independent.
-    * If ``lags`` is larger, each value is multiplied by a factor that decreases with the lag.
+    ``rows``: rows of successive residuals. With a single lag, its value is limited to the range
+    from -0.5 to 0. With several lags, the values are tapered.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -35,6 +32,7 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
     )
     found = products / max(products[0], 1e-12)
     if lags == 1:
+        # -0.5: all errors come from displaced encoder marks. 0: all errors are independent.
         found[1] = np.clip(found[1], -0.499, 0.0)
         return np.asarray(found)
     return np.asarray(found * (1.0 - np.arange(lags + 1) / (lags + 1)))
