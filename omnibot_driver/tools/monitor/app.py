@@ -149,11 +149,10 @@ class Monitor(App[None]):
         self.refresh_view()
 
     def _come_back(self) -> None:
-        """Draw the screen again after a suspension by SIGSTOP.
-
-        Textual's ``suspend`` ends the thread that reads keys. After the empty block, Textual draws
-        the screen, and starts a new such thread. Without ``suspend``, two threads would read keys.
-        """
+        """Draw the screen again after a suspension by SIGSTOP."""
+        # Textual's ``suspend`` ends the thread that reads keys. After the empty block, Textual
+        # draws the screen, and starts a new such thread. Without ``suspend``, two threads would
+        # read keys.
         with self.suspend():
             pass
 

@@ -55,10 +55,8 @@ IMU_PARAMETER: Final = "imu_frame"
 class Feed:
     """The connection to the driver ``name`` in ``namespace``, until ``close`` is called.
 
-    Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
-
-    ``dead_man``: source of the motion commands that are published; None if the monitor must not
-    move the robot.
+    ``dead_man``: source of the published motion commands; None if the monitor must not move the
+    robot. Any thread may send requests. Raises ToolError for invalid names.
     """
 
     def __init__(

@@ -16,10 +16,9 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which a report of the same state proves that the driver was still running.
+"""Age of the log's last state, in s, above which a report of this state proves a running driver.
 
-The time counts from the beginning of the last state in the recorded log. If /diagnostics does not
-report this state after that time, and the state is "disconnected", the driver had ended.
+If /diagnostics has no such report, and the state is "disconnected", the driver had ended.
 """
 
 

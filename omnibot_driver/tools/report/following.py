@@ -26,8 +26,7 @@ CONSTANT: Final = 0.02
 REVERSED: Final = -0.5
 """Ratio of measured to commanded motion below which the robot clearly moves the wrong way.
 
-The ratio is negative if the robot moves in the opposite direction. This limit also applies if no
-command was constant for long enough to compare the speeds.
+This limit also applies if no command was constant for long enough to compare the speeds.
 """
 TOLD: Final = 0.05
 """Speed of a wheel's rim, in m/s, above which a command or a measurement is regarded as motion.
@@ -38,11 +37,10 @@ STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
 SUSTAINED_S: Final = 1.0
 SLOW_START_S: Final = 3.0
-"""Time limit in s for standstills of a robot with two driving wheels that is commanded to move.
+"""Length in s from which a standstill despite a command is reported, for two driving wheels.
 
-Until the limit, the front wheel may still have to turn, or the motors may start slowly. Longer
-standstills are reported. If several commands in a row do not move the robot, the lengths of the
-standstills are added.
+A shorter standstill is normal: the front wheel may have to turn first, or the motors may start
+slowly.
 """
 AFTER_STOP_S: Final = 1.5
 """Time in s within which the robot must come to rest after an e-stop, or after the last command has
@@ -53,14 +51,11 @@ timed out."""
 class Answer:
     """How the robot responded to commands.
 
-    ``lag_s``: delay of the motion.
-
-    ``gains``: for each axis, measured / commanded motion; NaN if unknown.
-
-    ``error``: for each axis, rms of measured - gain · commanded motion.
-
-    ``spread``: for each axis, ``error`` / rms of the command. If no command was constant for long
-    enough, the gain also depends on how fast the motors react, and ``spread`` is infinite.
+    * ``lag_s``: delay of the motion.
+    * ``gains``: for each axis, measured / commanded motion; NaN if unknown.
+    * ``error``: for each axis, rms of measured - gain · commanded motion.
+    * ``spread``: for each axis, ``error`` / rms of the command; infinite if no command was constant
+      for long enough.
     """
 
     lag_s: float
@@ -89,11 +84,8 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    The delay is the one with the best fit. The gain of an axis comes from the times at which its
-    command is constant (``STEADY_S``) and not near zero. If these times last less than
-    ``SUSTAINED_S`` in all, the gain comes from all times.
-
-    ``usable``: for each measurement, whether to use it.
+    ``usable``: for each measurement, whether to use it. If commands were constant for at least
+    ``SUSTAINED_S`` (s) in all, gains come from these times only.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -213,11 +205,10 @@ def _sustained(times_s: Array, rows: Mask) -> list[Span]:
 
 
 def _without_slow_starts(stalls: list[Span], moves_s: Array) -> list[Span]:
-    """Return the standstills in ``stalls`` that are longer than a slow start (``SLOW_START_S``).
+    """Return the standstills in ``stalls`` that last at least ``SLOW_START_S`` (s).
 
-    The lengths of standstills are added if the robot does not move between them. So a robot that
-    never moves is found even if each command to move is short. ``moves_s``: the times in s at which
-    the robot moves as commanded.
+    The lengths of standstills are added if the robot does not move between them. ``moves_s``: times
+    in s at which the robot moves as commanded.
     """
     groups = groupby(stalls, key=lambda stall: int(np.searchsorted(moves_s, stall.begin_s)))
     together = [list(group) for _, group in groups]

@@ -67,10 +67,8 @@ def _all(log: Log) -> Iterator[Finding]:
 def _missing_imu(log: Log) -> Level:
     """Return the level of the finding that the log has no message of the IMU.
 
-    The driver's status "Stream" in the diagnostics shows whether the board has an IMU.
-
-    * GOOD: the board has no IMU.
-    * BAD: the board has an IMU. Also BAD if the log is of a single robot and has no such status.
+    * GOOD: the driver's status "Stream" shows that the board has no IMU.
+    * BAD: this status or a topic shows an IMU, or the log of a single robot lacks this status.
     * NOTE: otherwise.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]

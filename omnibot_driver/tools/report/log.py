@@ -52,8 +52,7 @@ class Series:
     def other_clock_s(self) -> float:
         """How far the recorder's clock is ahead of the timestamps' clock, in s.
 
-        This is the median of arrival time minus timestamp, but 0 if the median is at most 1 s
-        (``OTHER_CLOCK_S``): such a median can be a delay of the messages.
+        A difference of at most 1 s (``OTHER_CLOCK_S``) can be a delay of the messages, and gives 0.
         """
         late_s = (self.arrived_s - self.stamp_s)[np.isfinite(self.stamp_s)]
         ahead_s = float(np.median(late_s)) if len(late_s) else 0.0

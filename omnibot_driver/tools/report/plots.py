@@ -254,8 +254,7 @@ def timeline(log: Log) -> Figure:
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
     """Yield a span of time and a colour for each message of a diagnostic status.
 
-    A span ends at the next message. If that message comes 2 s later or more, or is missing, the
-    span ends after 1 s.
+    A span ends at the next message or, if none comes within 2 s, after 1 s.
     """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0

@@ -53,8 +53,8 @@ def _wheels(message: Any) -> Row:
 class Role:
     """How the messages of a topic are converted to rows of numbers.
 
-    ``width``: number of values in a row. None: one value for each wheel.
-    ``read``: for each message type, the function that converts a message to a row.
+    * ``width``: number of values in a row; None: one for each wheel.
+    * ``read``: functions that convert a message to a row, by message type.
     """
 
     width: int | None

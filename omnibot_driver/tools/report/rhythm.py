@@ -116,14 +116,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step between two timestamps, the end of its group of steps.
+    """Return, for each long step between two timestamps, the index after the end of its group.
 
-    A group contains the long step and the steps after it. If the later steps are short enough to
-    make up for the long step, no message is missing. The group ends before the next long step, and
-    has at most ``most`` steps (one if ``most`` is 0). The returned end is the index after the last
-    step.
-
-    ``wide``: indices of the long steps.
+    A group begins with the long step, ends before the next long step, and has at most
+    ``max(1, most)`` steps. ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

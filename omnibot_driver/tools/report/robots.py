@@ -36,11 +36,10 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that match the name of a topic, each with two values.
+    """Return the roles that match a topic's name, with the robot's namespace and whether they fit.
 
-    The first value is the namespace of the topic's robot. The second value says whether ``kind``,
-    the topic's message type, is right for the role. For a topic such as ``~/state``, the second
-    value is True only if the topic also belongs to a node in ``drivers``.
+    A role fits if ``kind`` is one of its message types. A topic such as ``~/state`` must also
+    belong to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -56,11 +55,8 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
     """Return the namespace and the topics of one robot.
 
-    ``wanted``: its namespace; None selects the only robot.
-
-    ``where``: name of the source of the topics, for error messages.
-
-    Raises ToolError if the robot does not exist, or if there are several and ``wanted`` is None.
+    ``wanted``: its namespace; None selects the only robot. ``where``: name of the source of the
+    topics, for error messages. Raises ToolError unless exactly one robot matches.
     """
     names = ", ".join(robots)
     if not robots:

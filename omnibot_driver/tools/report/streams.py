@@ -33,10 +33,8 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * Diagnostics of one robot: the last rate in them. If they contain no rate, the expected
-          rate becomes NaN for a robot with two wheels, and stays unchanged for any other robot.
-        * Diagnostics of several robots: their common rate; NaN if the known rates differ, or if
-          none is known.
+        * One robot: the last rate. Without a rate: NaN for two driving wheels, otherwise unchanged.
+        * Several robots: their common rate; NaN if the known rates differ, or if none is known.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]
         if log.alone:

@@ -17,17 +17,15 @@ LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
 """``LEAP_M``, ``LEAP_RAD``: limits in m and rad that show a jump of the pose (a leap).
 
-From one message to the next, the change of the pose is compared with the motion by the twist. If
-the difference is above a limit, the pose has jumped. The driver's own corrections of odom are
-smaller.
+They apply to the difference between the change of the pose and the motion by the twist. The
+driver's own corrections are smaller.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
 """Smallest time in s between two odometry messages that is regarded as a gap.
 
-In a gap, the twists of the messages do not show the motion. So a change of the pose over a gap is
-regarded as a jump only if the pose after the gap is zero.
+A change of the pose over a gap is regarded as a jump only if the pose after the gap is zero.
 """
 
 
@@ -40,14 +38,11 @@ def moving(odom: Series) -> Mask:
 class Steps:
     """The steps from each message of odom to the next.
 
-    ``way_m``, ``turned_rad``: distance and turn of the step; 0 for a leap.
-
-    ``off_m``, ``off_rad``: difference between the change of the pose and the motion by the twist.
-
-    ``leap``: whether this difference is too large. A large difference is usual in a gap, so there
-    only a step to the zero pose is a leap.
-
-    ``reset``: whether the step is a leap to the zero pose.
+    * ``way_m``, ``turned_rad``: distance and turn of the step; 0 for a leap.
+    * ``off_m``, ``off_rad``: difference between the change of the pose and the motion by the twist.
+    * ``leap``: whether this difference is too large. A leap over a gap must also lead to the zero
+      pose.
+    * ``reset``: whether the step is a leap to the zero pose.
     """
 
     way_m: Array
