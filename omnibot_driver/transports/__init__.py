@@ -66,9 +66,7 @@ class Transport(Protocol):
     def write(self, packets: Packets) -> None:
         """Write all packets.
 
-        A blocked line is regarded as missing, although its port is still open. This port gets only
-        the bytes that it accepts at once.
-
+        A blocked line is regarded as missing, and gets only the bytes that it accepts at once.
         Raises LinkError, and discards all unsent bytes, if the connection is lost.
         """
 

@@ -19,10 +19,10 @@ least time between two such lookups."""
 
 
 class HostName:
-    """The name of a host, and whether the name no longer leads to the address ``in_use``.
+    """The name of a host that may move to another address.
 
-    ``in_use``: the address to which the driver sends. A lookup of the name can take long, so each
-    lookup runs in its own thread. Only one lookup runs at a time.
+    ``in_use``: the address to which the driver sends. Lookups of the name can take long, so each
+    runs in its own thread.
     """
 
     def __init__(self, name: str, in_use: str) -> None:

@@ -67,15 +67,12 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited for 0.2 s.
 
-        If the result is False, the waiting bytes are discarded, and the caller must regard the line
-        as missing.
-
-        For a line that is already missing, the result is True. Its port may still be open, and then
-        gets only the part of ``data`` that it accepts at once.
+        The caller must then regard the line as missing. For a missing line, the result is True.
         """
         if self.port is None:
             return True
         if self.trouble:
+            # The line is missing, but its port may still accept bytes.
             self.port.write_if_room(((0, data),))
             return True
         if not self.waits:

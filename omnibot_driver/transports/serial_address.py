@@ -21,11 +21,10 @@ from omnibot_driver.transports import NOT_POLLABLE
 
 
 def check_address(url: str, parameter: str = "port", *, pollable: bool = False) -> None:
-    """Raise ParameterError if no attempt to open this port can ever succeed.
+    """Raise ParameterError if this port can never be opened; the check itself opens no port.
 
-    A missing device or an unknown host is accepted: it may appear later. No port is opened.
-
-    ``pollable``: whether the port must have a file descriptor.
+    A missing device or an unknown host is accepted: it may appear later. ``pollable``: whether the
+    port must have a file descriptor.
     """
     try:
         port = serial.serial_for_url(url, do_not_open=True)

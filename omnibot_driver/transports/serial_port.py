@@ -39,8 +39,6 @@ class SerialPort:
     """A ``Transport`` of one channel: an open port, used by this process alone.
 
     ``parameter``: the parameter that names the port, for messages.
-
-    ``close`` must leave DTR and RTS raised: if the next opening raises them, some boards restart.
     """
 
     ends_with_us = False
@@ -152,6 +150,8 @@ class SerialPort:
             self._arrivals.register(self._serial.pipe_abort_read_r or -1, select.POLLIN)
         if descriptor is not None and self._is_terminal:
             attributes = termios.tcgetattr(descriptor)
+            # Closing keeps DTR and RTS raised: if the next opening raised them, some boards would
+            # restart.
             attributes[2] &= ~termios.HUPCL
             termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
             # A pseudo-terminal would stay exclusive after the death of its user.

@@ -37,11 +37,10 @@ class Several:
     """A ``Transport`` of several lines. Each line is one channel. All lines are polled together."""
 
     def __init__(self, lines: Sequence[tuple[str, Opener]], retry_s: float = RETRY_S) -> None:
-        """Open the lines, each given as the name of its device and its opener.
+        """Open the lines, given as pairs of device name and opener.
 
-        Raises LinkError if no line can be opened, or if a line does not support ``poll``. Also
-        raises LinkError if another program uses the leading line: the line whose device has the
-        first path in alphabetical order.
+        Raises LinkError if no line can be opened, a line does not support ``poll``, or another
+        program uses the leading line (first path in alphabetical order).
         """
         self._retry_s = retry_s
         self._names = [name for name, _ in lines]
@@ -96,12 +95,10 @@ class Several:
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
-        """Return bytes that were received on one line. Lines with bytes are read in turn.
+        """Return bytes that were received on one line.
 
         Raises LinesChanged if a line was lost or reopened. Raises LinkError if all lines are
-        missing. Also raises LinkError if the leading line has never been open, and another program
-        uses this line. The leading line is the line whose device has the first path in alphabetical
-        order.
+        missing, or if another program uses the leading line, which has never been open.
         """
         if not self._ready:
             if not self._changed:  # the guard process may still have a copy of a line just lost
@@ -132,9 +129,8 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line, and keep the bytes that the line does not accept at once.
 
-        If a line has had waiting bytes for 0.2 s without a break, even if it accepted some, its
-        waiting bytes are discarded, and the line is regarded as missing. A missing line whose port
-        is still open gets only the bytes that the port accepts at once.
+        If a line has had waiting bytes for 0.2 s, these are discarded, and the line is regarded as
+        missing.
         """
         now = time.monotonic()
         with self._writing:
