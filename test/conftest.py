@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
 
 def free_domain() -> tuple[int, socket.socket]:
-    """Return a ROS domain that no other test process uses, and the socket that marks it as used.
+    """Return a ROS domain from 1 to 99 that no other test process uses, and its socket.
 
-    Domains 0 to 101 are safe on every platform. 0 is the default of all ROS programs, and some
-    tests need 100 and 101 without any driver.
+    The open socket marks the domain as used. Raises OSError if all these domains are in use.
     """
+    # ROS uses 0 by default; some tests need 100 and 101 without any driver; numbers above 101 are
+    # not safe on every platform.
     for number in range(1, 100):
         mark = socket.socket(socket.AF_UNIX)
         with contextlib.suppress(OSError):
@@ -60,9 +61,8 @@ WAITING = ("faults", "system", "tools")
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Order the test files for parallel workers.
 
-    The longest test files come first. Then files with tests that wait in real time alternate with
-    files with tests that compute, so that the drivers in the waiting tests have enough processor
-    time.
+    The longest files come first. Then files that wait in real time and files that compute
+    alternate, so that the drivers in waiting tests get enough processor time.
     """
     if not hasattr(config, "workerinput"):
         return

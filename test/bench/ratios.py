@@ -13,13 +13,10 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The results of repeated measurements, alternately of the driver and of the floor.
+    """Results for the driver and for the floor, the smallest program with the same output.
 
-    The floor is the smallest program with the same output.
-
-    ``ours``, ``floor``: the values of driver and floor, in pairs.
-
-    ``goal``: the largest allowed ratio of driver to floor.
+    ``ours``, ``floor``: the values of driver and floor, in pairs. ``goal``: the largest allowed
+    ratio of driver to floor.
     """
 
     name: str

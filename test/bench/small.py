@@ -20,10 +20,9 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one processor core. The driver and the floor are measured once with each share.
+"""Shares of one processor core with which the driver and the floor are each measured once.
 
-The floor is the smallest program with the same output. In each measurement, the driver and the
-floor get the same share.
+The floor is the smallest program with the same output as the driver.
 """
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3

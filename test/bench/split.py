@@ -30,8 +30,8 @@ within: list[float] = []
 def timed(owner: type, name: str, stage: str) -> None:
     """Replace a method by one that also measures its processor time in the reader's thread.
 
-    The time is added to the total of ``stage``. If the method calls a method of another stage, the
-    time of this call is added only to the other stage.
+    The time is added to the total of ``stage``, without the time of the measured methods that the
+    method calls.
     """
     method: Callable[..., Any] = getattr(owner, name)
 

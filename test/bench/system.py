@@ -41,10 +41,10 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios of the driver's value to the floor's value, for each adapter.
+"""Largest allowed ratios of the driver to the floor, the smallest program with the same output.
 
-The floor is the smallest program with the same output. None means no limit. Order: median latency,
-99th percentile of the latency, processor time, latency of cmd_vel.
+None: no limit. Order: median and 99th percentile of the latency, processor time, latency of
+cmd_vel.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 
@@ -121,10 +121,10 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return table rows that compare the costs of the floor, of each relay, and of the driver.
+    """Return table rows with the costs of floor, relays and driver, relative to those of the floor.
 
-    The floor is the smallest program with the same output as the driver. A relay is a program
-    between the floor and the driver: each relay has one more task than the relay before.
+    The floor is the smallest program with the driver's output. Each relay has one more task than
+    the relay before.
     """
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
