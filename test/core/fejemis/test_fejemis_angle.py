@@ -74,10 +74,9 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """The driver reads nothing for 80 ms, and then reads the two boards one after the other.
+    """The driver reads nothing for 80 ms, and then reads the two boards in turn.
 
-    Until the driver has read the front board, it refuses motion, and the refusal names the late
-    computer as the cause.
+    Until the front board is read, a refusal of motion names the late computer as the cause.
     """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}
@@ -96,10 +95,10 @@ def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
 
 
 def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
-    """A late read does not hide that the front board is silent.
+    """The front board is silent, and the driver reads late.
 
-    While the driver reads late, a refusal names the computer as the cause. As soon as a read is in
-    time, a refusal names the front board.
+    A refusal names the computer as the cause. As soon as a read is in time, a refusal names the
+    front board.
     """
     bench = nominal()
     bench.run(0.1)

@@ -35,10 +35,10 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """Every relayed angle is right within 0.5°, and usually rounded to 0.1°.
+    """Every relayed angle is right within 0.5°.
 
-    The text of some angles could be damaged in a way that the checksum does not show. The driver
-    writes a safer angle near such an angle.
+    The driver rounds to 0.1°, or chooses a safer angle nearby if the checksum could miss damage to
+    the text.
     """
     told = [float(relayed(angle_deg)[4:]) for angle_deg in EVERY]
     assert max(map(abs, told)) == 90.0
@@ -49,10 +49,10 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """If a line with an angle loses two characters, the checksum usually detects the loss.
+    """A line with an angle loses two characters.
 
-    The checksum can miss the loss only if the angle is to the right (negative), and its text
-    contains a 6. The board then reads an angle of 0° to 10° to the left of straight ahead.
+    The checksum misses the loss only if the angle is negative (right) and contains a 6. The board
+    then reads 0° to 10° (left).
     """
     across = 0
     for angle_deg in EVERY:
@@ -81,10 +81,9 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
-    """The text of an angle from −60° to −69° contains ``-`` and ``6``, in whatever form.
+    """The text of every angle from −60° to −69° contains ``-`` and ``6``.
 
-    The codes of these two characters add up to 99. So the checksum, which is modulo 99, does not
-    detect that both are lost.
+    The checksum misses their loss: their codes add up to 99, and the checksum is modulo 99.
     """
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
@@ -129,10 +128,10 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     angles_deg: list[float],
 ) -> None:
-    """For any sequence of angles, the board reads no angle beyond 90°, even if characters are lost.
+    """For any sequence of angles, the board reads no angle beyond 90°.
 
-    * With a checksum: two characters are lost, and the checksum does not detect this.
-    * Without a checksum: one character is lost.
+    A line with a checksum loses two characters, which the checksum does not show; a line without a
+    checksum loses one.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):

@@ -69,10 +69,10 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """The front wheel was stuck. Motion is refused until the wheel has turned by more than 3°.
+    """The front wheel was stuck.
 
-    If motion were allowed earlier, each new command would move the robot for 1 s, until the driver
-    detects the fault again.
+    Motion is refused until the wheel has turned by more than 3°. Otherwise, each new command would
+    move the robot for 1 s.
     """
     follower = Follower()
     at = blocked(follower, 0.0)

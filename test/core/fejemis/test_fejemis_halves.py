@@ -213,10 +213,10 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
     ids: tuple[int, int], speaks: set[int], *, estop: bool
 ) -> None:
-    """One board is silent, or both are drive boards. After 5 s, Stop is repeated less often.
+    """One board is silent, or both are drive boards.
 
-    Stop is then sent with each try to start the boards, twice a second. While the e-stop is
-    latched, it is still sent 20 times a second.
+    After 5 s, Stop is sent only with each try to start the boards, twice a second; with the e-stop,
+    20 times a second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks
@@ -324,10 +324,10 @@ def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() ->
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_restarts_at_the_port_of_the_other_is_named(half: str) -> None:
-    """Each board is connected to the port of the other board, and one board restarts.
+    """Two boards come back at exchanged ports, and one of them has restarted.
 
-    The start message of this board arrives before its first heartbeat. As soon as the heartbeat
-    arrives, the driver reports that this board, and only this board, has restarted.
+    After this board's first heartbeat, the driver reports that this board, and no other, has
+    restarted.
     """
     bench = nominal()
     bench.close()

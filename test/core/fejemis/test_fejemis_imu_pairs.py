@@ -281,13 +281,11 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Lines are lost, repeated or late. The driver still pairs only lines of the same sample.
+    """Lines are lost, repeated or late.
 
-    A wrong pair is allowed only if nothing in the stream shows the error: its first line is late,
-    its second line is read less than 5 ms later, and no pose follows in the same read.
+    Each pair has lines of one sample, unless nothing in the stream shows the error.
 
-    ``period_s``: period of the reads in s, which must differ from the period of the samples. If it
-    is None, each line is read as soon as it arrives, except while the host is busy.
+    ``period_s``: period of the reads in s; None: each line is read at once, apart from stalls.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
@@ -320,10 +318,10 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 
 @pytest.mark.slow
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
-    """The samples at the beginning of a late read are published.
+    """The driver reads only every 0.2 s.
 
-    Before a late read, no lines come, so samples may have been lost. The driver holds the samples
-    back until the next pose shows that no samples are missing.
+    The first samples of a read are published, too, after the next pose has shown that no samples
+    are missing.
     """
     bench = nominal()
     bench.run(3.0)

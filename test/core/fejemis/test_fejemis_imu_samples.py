@@ -46,10 +46,10 @@ def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken
 
 
 def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
-    """Two late samples do not shift the sampling times of the next ones.
+    """Two samples arrive 17 ms late, as if one were lost.
 
-    The delay could also mean a lost sample. But the third sample would then have arrived 3 ms
-    before the board took it, which is impossible.
+    The next arrives only 7 ms late, which is impossible after a loss, so the driver shifts no later
+    sampling time.
     """
     late_s = {200: 0.017, 201: 0.017, 202: 0.007}
     arrivals = [0.01 * number + late_s.get(number, 3e-4) for number in range(600)]
@@ -58,11 +58,10 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
 
 
 def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
-    """The driver has counted several samples as lost, although they were perhaps only late.
+    """Samples are lost or late, and the driver has counted too many as lost.
 
-    Then a sample seems to arrive before its sampling time, because the count of lost samples is too
-    high. The driver reduces the count only as far as necessary. If the driver reduced the count
-    further, the stamps would be several periods too old.
+    A sample that seems too early reduces this count only as far as necessary: no stamp becomes
+    several periods too old.
     """
     imu, chance = ImuSamples("m/s^2"), random.Random(2)
     arrived_s, pose_s, errors = 0.0, -math.inf, []
@@ -153,10 +152,9 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return, for each published sample, the control cycles in which the board sent its two lines.
+    """Return, for each published sample, the cycles of its gyro line and acceleration line.
 
-    The two lines are the gyro line and the acceleration line. Each cycle is given as its number
-    divided by 1000. ``bench`` must be a result of the function ``numbered``.
+    Each cycle is given as its number divided by 1000. ``bench`` must be a result of ``numbered``.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
@@ -167,10 +165,9 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("kept", ["all", "lost", "twice"])
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
-    """The two lines of each published sample come from the same cycle of the board.
+    """Each read has ten samples, and 1 % of the lines may be lost or repeated.
 
-    Each read has ten samples. In the case "lost", 1 % of the lines is lost; in the case "twice",
-    1 % is repeated.
+    The two lines of each published sample come from the same cycle of the board.
     """
     bench = numbered()
     chance = random.Random(5)

@@ -179,10 +179,9 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line loses its end and runs into the next line. The decoder discards the joined lines.
+    """A line loses its end and runs into the next line, and a later line has a wrong checksum.
 
-    The joined lines count as one fault, and the following line is decoded. A line with a wrong
-    checksum is a fault, too.
+    Each is counted as one fault, and the good line between them is decoded.
     """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
@@ -318,10 +317,10 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """The firmware begins to print a kind of line with another number of decimals.
+    """The firmware changes the number of decimals in a kind of line.
 
-    The decoder discards the first two such lines as damaged, and accepts the next ones. If the
-    number of decimals varies all the time, all lines of this kind are accepted.
+    The decoder discards two changed lines, and accepts the next. If the number varies all the time,
+    all lines are accepted.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
@@ -333,10 +332,11 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """In each window of 24 lines of a kind, the decoder counts the lines of an unusual form.
+    """Of 24 lines of one kind, the decoder discards the first seven with an unusual form.
 
-    The first seven such lines in a window are discarded as damaged; the eighth is accepted.
-    ``windows``: number of earlier windows without a line of an unusual form.
+    The eighth such line is accepted.
+
+    ``windows``: number of earlier windows of 24 lines without an unusual form.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

@@ -60,10 +60,10 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The manual's example of a motion line becomes another motion by the loss of two characters.
+    """The manual's example of a motion line loses two characters.
 
-    The checksum still fits. So the driver does not send the example, but a line that commands the
-    same motion with other digits.
+    The checksum still fits, but the line commands another motion; so the driver sends this motion
+    with other digits.
     """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
@@ -115,10 +115,10 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A stop line, ``rc 2 0 0``, and the next line together lose two characters.
+    """A stop line and the next line together lose two characters.
 
-    No false motion is read, because an empty line separates the two lines. Otherwise the loss of
-    the line end and ``;`` could join the next line's checksum to the stop line: ``rc 2 0 092``.
+    No false motion is read: an empty line keeps the next line's checksum out of the stop line
+    (``rc 2 0 092``).
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)

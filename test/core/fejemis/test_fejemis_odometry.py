@@ -108,8 +108,7 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 def test_two_different_false_poses_in_a_row_move_nothing() -> None:
     """Two different false poses in a row do not move the odometry.
 
-    The robot could have driven to each of these poses. But the wheel speeds contradict both the
-    motion to the first pose and the motion from the first to the second.
+    The robot could have driven to each pose, but the wheel speeds contradict both motions.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)

@@ -158,11 +158,10 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_other_order(
     bench: Bench,
 ) -> None:
-    """A power off is pending. Both boards restart unseen, and come back at exchanged ports.
+    """A power off is pending.
 
-    The restart has cancelled the power off, so the driver allows motion again. To detect the
-    restart, the driver compares the time of each board with the board's earlier time at the other
-    port.
+    Both boards restart unseen, and come back at exchanged ports. The driver recognizes the restarts
+    by the boards' times, and allows motion again.
     """
     bench.close()
     bench.speaks = set()
@@ -281,7 +280,6 @@ def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
 ) -> None:
     """For a power off, the driver sends a delay whose checksum shows the loss of any two digits.
 
-    If necessary, the driver sends a longer delay: ``off 311`` instead of ``off 300``, because the
-    checksum of ``off 300`` would not show the loss of 3 and 0.
+    The delay may be longer than wanted: 311 s instead of 300 s.
     """
     assert whole_seconds(wanted_s) == seconds

@@ -104,10 +104,10 @@ def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -
 
 
 def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() -> None:
-    """A user's request to load a configuration succeeds, although the front board sends an error.
+    """The front board does not know the driver's query ``fwoi``, and answers with an error.
 
-    The front board does not know the driver's query ``fwoi``, and answers with an error. The error
-    proves that the front board receives lines.
+    A request to load a configuration still succeeds: the error proves that the board receives
+    lines.
     """
     jobs = Jobs()
     jobs.ask(Job.LOAD, None, 0.0)
@@ -329,10 +329,10 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
-    """The driver shuts down while a job loads a configuration. The job fails.
+    """The driver shuts down while a job loads a configuration.
 
-    The failure names the shutdown as the cause. After the beginning of the shutdown, the driver
-    sends only stop commands and angles of the front wheel. The driver sends no settings.
+    The job fails, and names the shutdown as the cause. The driver sends only stop commands and
+    front-wheel angles, and no settings.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

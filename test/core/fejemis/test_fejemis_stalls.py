@@ -56,11 +56,10 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
     ],
 )
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
-    """The driver stalls during a drive. The odometry then contains the whole motion of the drive.
+    """The driver stalls during a drive, and may not notice the stall.
 
-    A driver that does not notice the stall rejects all lines that are more than one second late.
-    The next displacement also covers the time of these lines, and the driver does not reject this
-    displacement as implausible.
+    The odometry then contains the whole motion, and the driver rejects no displacement as
+    implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)

@@ -162,10 +162,9 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """After 2.5 s, the robot has the commanded speed and turn rate.
+    """After 2.5 s, the robot has the commanded speed, within 1.2 %, and turn rate, within 3 %.
 
-    Tolerance of the speed: 1.2 % of the outer wheel's speed. Tolerance of the turn rate: 3 % of the
-    outer wheel's speed, divided by the track width.
+    The percentages are relative to the speed of the outer wheel.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
@@ -253,11 +252,10 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 
 
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
-    """The motion monitor has stopped the robot twice. Then the user commands a motion backward.
+    """The motion monitor has stopped the robot twice.
 
-    The driver sets this command to zero, because ``allow_reverse`` is off. Then the user sets
-    ``allow_reverse``. The robot stays at rest, and the next reverse command is refused until
-    ~/start.
+    The user commands a reverse motion, and only then sets ``allow_reverse``. The robot stays at
+    rest, and the next reverse command is refused until ~/start.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

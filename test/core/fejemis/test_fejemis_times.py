@@ -173,8 +173,8 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
     """Stamps of board-specific readings (``ExtraReading``) increase within each type of content.
 
-    If a stamp equals the last stamp of its type, it becomes 1 µs later. If a stamp is earlier than
-    the last stamp of another type, it is not changed.
+    A stamp equal to the last one of its type becomes 1 µs later. Stamps of other types have no
+    effect.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):

@@ -55,8 +55,7 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_while_the_robot_brakes_hardly_moves_the_odometry() -> None:
     """The board's pose is set to zero while the robot brakes, and the next wheel speeds are lost.
 
-    The odometry has a small error in the motion up to the first pose after the zeroing. The poses
-    show all later motion.
+    The odometry is right within 4 mm, because the poses show all later motion.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
@@ -93,8 +92,7 @@ def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_before_three_poses_in_a_row_loses_no_motion(v: float) -> None:
     """The board's pose is set to zero before each of three poses, 20 ms apart, in a steady drive.
 
-    Regression: between two of these poses, the robot drove up to 9 mm, but the odometry used the
-    poses, which show no motion.
+    The odometry contains the whole motion, although these poses show none.
     """
     drive = Drive()
     drive.run(v, 0.0, 1.0)
@@ -126,10 +124,10 @@ def test_a_pose_set_to_zero_three_times_at_once_does_not_move_the_odometry() -> 
 
 @pytest.mark.parametrize("wait_s", [0.0, 0.02, 0.04, 0.06, 0.1])
 def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
-    """The driver reads every 0.15 s. Another program sets the board's pose to zero.
+    """The driver reads every 0.15 s, and another program sets the board's pose to zero.
 
-    ``odom`` does not jump. Regression: the age of wheel speeds was counted from their arrival. So
-    at the first pose of a read, the last wheel speeds seemed too old to be used.
+    ``odom`` does not jump. Regression: the last wheel speeds before the pose seemed too old to be
+    used.
     """
     bench = nominal()
     bench.drive_on(0.5, 0.3, 0.6)
