@@ -29,10 +29,8 @@ FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 class Bench(AnyBench):
     """A session with a simulated LOIS ECU, which has been in state nominal for 1.5 s.
 
-    ``steps``: encoder ticks of one turn of a wheel.
-
-    ``own_periods``: whether the board keeps its own periods of the reports, if ``settings`` has
-    none.
+    ``steps``: encoder ticks of one wheel turn. ``own_periods``: whether the board keeps its own
+    report periods if ``settings`` has none.
     """
 
     def __init__(

@@ -185,16 +185,11 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 class Rig:
     """A simulated board and its driver.
 
-    ``ours``: the driver's settings; None means ``HOST_GAINS``.
-
-    ``estimates``: pairs of an estimated odometry and the robot's true pose.
-
-    ``loss``: probability that a byte is lost.
-
-    ``reads_s``: least and greatest time between two reads of the driver, in s.
-
-    ``own_periods``: if ``ours`` has no report periods, whether the board keeps its own periods, or
-    gets ``USUAL_PERIODS_MS``.
+    * ``ours``: the driver's settings; None means ``HOST_GAINS``.
+    * ``estimates``: pairs of estimated odometry and true pose.
+    * ``loss``: probability that a byte is lost.
+    * ``reads_s``: least and greatest time between two reads, in s.
+    * ``own_periods``: whether the board keeps its own report periods if ``ours`` has none.
     """
 
     def __init__(

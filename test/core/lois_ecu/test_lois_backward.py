@@ -21,10 +21,10 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """After a backward drive, the distance is right within 3 %.
+    """After a backward drive, the odometry's distance is right within 3 %.
 
-    The mean error of the position is below 10 % of the distance. The public firmware counts no
-    ticks in such a drive, and reports integer RPM.
+    The mean error of the position is below 10 % of the distance, although the public firmware
+    counts no ticks backward.
     """
     seeds = (1,) if firmware == "documented" else (1, 2)
     drives = [driven(firmware, "reverse", seed) for seed in seeds]
@@ -70,10 +70,9 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 
 
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
-    """The driver uses all of the reports that a busy computer reads at once, every 0.05 to 0.35 s.
+    """A busy computer reads several reports at once, every 0.05 to 0.35 s.
 
-    If reports were skipped, the driver would not see each wheel that stops, and the position would
-    be wrong by 4 m.
+    The odometry uses all of these reports: skipped reports would hide wheels that stop.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m
@@ -81,10 +80,9 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -
 
 
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
-    """The odometry has found that a wheel is at rest, but the board's heading shows a turn.
+    """The odometry has found a wheel at rest, but the board's heading shows a turn.
 
-    The board computes its heading from the old speed of this wheel, so the heading is wrong. The
-    odometry does not assume that the wheel rolls.
+    The odometry still assumes rest: the board computes this heading from an old speed of the wheel.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)

@@ -107,10 +107,10 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 
 @pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
-    """If the board's clock jumps, the delay of the next tick report is irregular.
+    """The board's clock jumps by ``leap_s``.
 
-    The delay is usually 0. A jump by 0.05 s or 0.2 s forward makes the delay negative by as much,
-    and a jump back makes it positive by as much.
+    The delay of the next tick report, which is usually 0, then becomes −``leap_s``, and is reported
+    as irregular.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

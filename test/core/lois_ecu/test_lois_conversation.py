@@ -117,8 +117,8 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """A robot whose user has switched the checksums off can be driven.
 
-    The driver selects lines without checksums by command 0x11 with value 4. This overwrites the
-    "short correction" of the left wheel, so the driver writes it again.
+    The driver restores the left "short correction", which the command for lines without checksums
+    (0x11, value 4) overwrites.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver._upkeep.writer.confirmed:
@@ -137,8 +137,8 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.
 
-    The public firmware counts no ticks in a backward drive. So after a backward drive, the ticks do
-    not prove that the robot is at rest.
+    After a backward drive, the ticks prove nothing on the public firmware, which counts no ticks in
+    such a drive.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -178,8 +178,7 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """After a Stop without RPM 0/0, a slower set-point than before does not start the wheels.
 
-    The firmware's speed controller still uses the last measured speed, which is higher than the
-    set-point. The controller has no feed-forward here, so it gives the wheels no power.
+    The firmware's controller still uses the higher speed that it measured last, and gives no power.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)

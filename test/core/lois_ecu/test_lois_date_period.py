@@ -37,10 +37,9 @@ class DeafBench(Bench):
 @pytest.mark.slow
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """The board has the right period of the date although a line that sets the period is lost.
+    """One of the lines that set the period of the date is lost (each line in turn).
 
-    The driver requests one date, which ends the periodic dates, and then sets the period again
-    several times. The test loses each of these lines in turn.
+    The board still has the right period, because the driver sets it several times.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
@@ -52,10 +51,9 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """The driver confirms the board's settings, and the board keeps the user's period of the date.
+    """The driver requests a date, which confirms the settings, but also ends the periodic dates.
 
-    To confirm the settings, the driver requests one date. This request ends the periodic dates, so
-    the driver sets the period again.
+    The board then has the user's period of the date again.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

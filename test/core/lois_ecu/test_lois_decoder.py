@@ -215,10 +215,10 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """The decoder drops a report whose tick counts jump, and returns the next report.
+    """The tick counts of a report jump.
 
-    If the next counts continue the counts before the jump, only the dropped report was wrong. If
-    they continue the counts after the jump, the board has restarted.
+    The decoder drops this report, and accepts the next one, whether it continues the counts before
+    or after the jump.
     """
     decoder = LoisDecoder()
     said = [
@@ -294,11 +294,10 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
 
 
 def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None:
-    """A line that lost two characters is not taken for a line without a checksum.
+    """A line that lost two characters looks like a line without a checksum.
 
-    Real lines without a checksum are accepted after a few of them have come.
-
-    Regression: zero ticks became 57 ticks, because the checksum was read as a part of the value.
+    The decoder drops this line. Real lines without a checksum are accepted after a few of them have
+    come.
     """
     decoder = LoisDecoder(sum_required=False)
     heading, short = encode_report(Heading(0)), b":100000003b\n"
@@ -310,10 +309,9 @@ def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None
 
 
 def test_half_an_odometry_group_of_zeros_is_not_a_report_of_ticks() -> None:
-    """An odometry group contains only zeros, and the driver reads its second half late.
+    """The driver reads the second half of an odometry group of zeros late.
 
-    The decoder does not regard this half as a tick report. Regression: such a tick report, with a
-    clock of 0, seemed to show a restart.
+    The decoder does not take this half for a tick report, whose clock of 0 would show a restart.
     """
     ticks, odometry = Ticks(4317, 0, 0), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     decoder = LoisDecoder()

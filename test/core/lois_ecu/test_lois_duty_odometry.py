@@ -44,8 +44,7 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
 def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_scale() -> None:
     """In a drive by duty just after Stops, the covariance includes the error of ``duty_scale``.
 
-    This error is 30 % (standard deviation) for each wheel. The Stops before the drive are duties of
-    0, which do not reduce the error. The firmware counts no ticks in this drive.
+    Its standard deviation is 30 % for each wheel. Stops, which are duties of 0, do not reduce it.
     """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
     assert bench.written[-1][1].startswith(b":0100000000")

@@ -47,8 +47,7 @@ class Reports:
 
         * ``rpm``: reported speeds of the left and the right wheel in RPM.
         * ``ticks``: newly counted ticks of the left and the right wheel.
-        * ``still``: whether the board repeats its last odometry report, because no wheel has
-          ticked.
+        * ``still``: whether the board repeats its last odometry report.
         * ``passed_s``: time in s that the board assumes for the motion at ``rpm``; unused if
           ``still``.
         """

@@ -68,10 +68,10 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 
 @pytest.mark.slow
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
-    """All settings reach the board, although a busy computer sends many lines without a pause.
+    """A busy computer sends many settings without a pause, and all reach the board.
 
-    The driver sends the settings in several rounds. Only the last line of a round requests a date,
-    because the board receives nothing while it sends a date.
+    Only the last line of a round requests a date, because the board receives nothing while it sends
+    one.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)
@@ -108,10 +108,9 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
 
 @pytest.mark.parametrize("reads_s", [0.001, 0.01, 0.07])
 def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
-    """A setting is sent at least 15 ms after a Stop, if the driver is called often enough.
+    """A driver that is called often enough sends each setting at least 15 ms after a Stop.
 
-    Regression: the driver sent the low-pass setting directly after the first Stop. If fourteen
-    characters of these two lines were lost, the remaining characters could command full duty.
+    Otherwise, lost characters could join a Stop and a setting to a command of full duty.
     """
     points = SetPoints(HOST_GAINS)
     writer = SettingsWriter(HOST_GAINS, points)
@@ -130,13 +129,9 @@ def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
 
 @pytest.mark.parametrize("waited_s", [0.1, 5.0])
 def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) -> None:
-    """A setting that waited for the end of a drive is sent at least 15 ms after the last Stop.
+    """A drive ends with repeated Stops, while a setting waits.
 
-    The setting waits for at most 0.5 s after the first Stop, even if the settings writer is called
-    only at the times of repeated Stops.
-
-    Regression: a setting that had waited for more than half a second was sent directly after the
-    Stop.
+    The setting is sent after 15 ms without a Stop, or at the latest 0.5 s after the first Stop.
     """
     settings = LoisEcuSettings()
     points = SetPoints(settings)
@@ -160,12 +155,9 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 
 @pytest.mark.parametrize("with_sum", [True, False])
 def test_a_recovery_that_waited_for_a_stop_follows_it_after_a_pause(with_sum: bool) -> None:
-    """No GPS date arrives in a long drive. Perhaps the board does not obey.
+    """No GPS date arrives in a long drive, so the driver must restore the board's mode.
 
-    So after the Stop, the driver restores the board's mode. The driver writes the mode 15 ms after
-    the Stop, and writes no setting together with the mode.
-
-    Regression: the driver wrote the mode directly after the Stop.
+    The driver writes the mode 15 ms after the Stop, and writes no setting with it.
     """
     settings = LoisEcuSettings(with_sum=with_sum)
     points = SetPoints(settings)

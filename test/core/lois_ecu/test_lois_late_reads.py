@@ -168,9 +168,9 @@ def stalled_drive(
 ) -> tuple[float, float]:
     """Drive, read nothing for ``stall_s``, and stand still for 3 s.
 
-    Return the error of the estimated position, and its standard deviation, in m.
+    Return the error and the standard deviation of the estimated position, in m.
 
-    * ``most``: number of bytes that the kernel keeps. A read returns at most ``KERNEL_BUFFER``.
+    * ``most``: number of bytes that the kernel keeps.
     * ``during``: function that is called with the time since the beginning of the stall, in s.
     """
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -276,10 +276,10 @@ def test_a_backlog_in_several_reads_leaves_the_pose_right(firmware: str, stall_s
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [0.3, 1.0, 2.5])
 def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
-    """The driver stalls, and the board restarts. The robot stops, and so does the motion in odom.
+    """The driver stalls, and the board restarts meanwhile, so the robot stops.
 
-    The driver does not know the time of the restart. The covariance covers the resulting error, in
-    each phase of the board's timers.
+    The motion in odom ends, too. The covariance covers the error that results from the unknown time
+    of the restart.
     """
 
     def reboot(bench: Bench, since_s: float) -> None:

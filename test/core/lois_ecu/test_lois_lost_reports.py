@@ -73,10 +73,10 @@ def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
 
 @pytest.mark.parametrize("gap_s", [0.6, 0.75])
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
-    """In a steady drive, a gap below 1 s adds less than 10° to the heading's standard deviation.
+    """In a steady drive, no reports arrive for less than 1 s.
 
-    No reports arrive in the gap. The heading's error is below 10° too. In a longer gap, the board
-    might have restarted.
+    This gap adds less than 10° to the heading's standard deviation, and the heading's error is
+    below 10°.
     """
     for phase in range(8):
         rig = Rig(nominal("firmware"), HOST_GAINS)

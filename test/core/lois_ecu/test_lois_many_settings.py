@@ -47,11 +47,10 @@ def longest_gap_s(bench: Bench, ours: LoisEcuSettings) -> float:
 @FIRMWARE
 @pytest.mark.parametrize("ticks_ms", [300, 400, 500])
 def test_ticks_keep_coming_while_many_settings_are_written(firmware: str, ticks_ms: int) -> None:
-    """A setting changes while the robot drives. The driver writes all settings in several rounds.
+    """A setting changes in a drive, and the driver writes all settings.
 
-    Each time the driver writes the period of the ticks, the next tick report is delayed. But the
-    tick reports come often enough: the driver does not regard the board as lost, and does not
-    refuse motion. The reports finally confirm the settings, while the robot still drives.
+    The tick reports finally confirm the settings. Until then, none is so late that the driver
+    regards the board as lost.
     """
     ours = replace(ALL, periods_ms={Stream.TICKS: ticks_ms, **SLOW})
     bench = Bench(firmware, ours)
@@ -73,8 +72,7 @@ def periods_written(bench: Bench, ticks_ms: int) -> int:
 def test_a_long_period_is_written_four_times() -> None:
     """The driver writes a period of 0.5 s for the tick reports at least four times.
 
-    A text line may be lost, and the driver cannot detect the loss: tick reports with the board's
-    own period of 0.4 s come at nearly the same rate.
+    The driver cannot detect a lost line: the board's own period, 0.4 s, is nearly the same.
     """
     bench = Bench("firmware", own_periods=True)
     bench.run(5.0)

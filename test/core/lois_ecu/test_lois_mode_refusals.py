@@ -18,11 +18,10 @@ GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
 @pytest.mark.slow
 @FIRMWARE
 def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: str) -> None:
-    """Each reason for a refusal is given only while it is true.
+    """The user sets a terminal mode, and later ends it.
 
-    * Before a terminal mode is written: the mode is changing.
-    * In the mode: the mode itself.
-    * After the user has ended the mode: the board has not left it yet.
+    Refusals name the change of the mode, then the mode itself, and then the board that has not left
+    the mode yet.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -73,8 +72,7 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
 def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
     """The user sets a terminal mode, and takes it back before the driver has written it.
 
-    The driver has begun to stop the robot for the terminal mode. The robot stops and stays at rest,
-    and the driver no longer refuses motion.
+    The robot, which is already braking, stops, and then motion is allowed.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 1.0)
@@ -88,10 +86,9 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
-    """The user changes the drive mode and the terminal mode, and then undoes the second change.
+    """The user changes the drive mode and the terminal mode, and takes the terminal mode back.
 
-    The driver still stops the robot, because the drive mode can change only at rest. During this
-    stop, the driver refuses motion, and names only the drive mode as the reason.
+    The driver still stops the robot for the drive mode, and refusals name only the drive mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

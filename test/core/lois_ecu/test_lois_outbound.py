@@ -83,10 +83,7 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(name: str, with_sum:
 def test_settings_that_lose_up_to_two_characters_never_command_a_motion(with_sum: bool) -> None:
     """Lines of settings and modes lose up to two characters on the way to the board.
 
-    At the beginning, the board expects no checksums, even if the lines have them. The firmware
-    never finds a motion command in the remaining characters.
-
-    Regression: a Stop with a checksum lost two zeros, and commanded 59 % duty to the right wheel.
+    The board, which expects no checksums at first, never finds a motion command in the rest.
     """
     settings = LoisEcuSettings(with_sum=with_sum)
     writer = SettingsWriter(settings, SetPoints(settings))
@@ -121,11 +118,9 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """The loss of 14 adjacent characters can turn two set-points into a wrong set-point.
+    """The loss of 14 adjacent characters (one line) can join two set-points to a wrong one.
 
-    A line has 14 characters, so the beginning of the first set-point then joins the end of the
-    second. The board may lose all characters for up to 13 ms, so the driver sends set-points at
-    least 18 ms apart.
+    A board loses characters for at most 13 ms, so set-points are sent at least 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -133,11 +128,9 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 
 
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
-    """The loss of 14 adjacent characters can turn a Stop and a setting into a full-duty command.
+    """If a Stop and a later setting lose 14 adjacent characters, the rest can command full duty.
 
-    This is possible only if the Stop comes first: the Stop's beginning then joins the end of the
-    setting (low-pass coefficient). The board loses characters for at most 13 ms. So the driver
-    sends a setting at least 15 ms after a set-point.
+    The reverse order is safe, so only a setting after a set-point must wait (15 ms).
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))
@@ -151,11 +144,9 @@ def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> No
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """The loss of adjacent characters can turn a motion line and an LED line into a wrong motion.
+    """If a motion line and a later LED line lose characters, the rest can be a wrong motion.
 
-    This is possible only if the motion line comes first: the motion line's beginning then joins the
-    end of the LED line. The board loses characters for at most 13 ms. So the driver sends an LED
-    line at least 15 ms after a motion line.
+    The reverse order is safe, so only an LED line after a motion line must wait (15 ms).
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

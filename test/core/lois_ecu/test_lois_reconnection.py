@@ -101,12 +101,10 @@ def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_m
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """The board is silent for a while, and its tick counts are then zero.
+    """The board is silent, and its tick counts are then zero.
 
-    * ``restarted`` is True: the board's clock has begun at zero. The driver counts a restart, and
-      the pose does not jump.
-    * ``restarted`` is False: the board's clock has gone on. The driver concludes that the wheels
-      have rolled back, and the pose moves back.
+    If the board's clock has begun at zero, too, the driver counts a restart and keeps the pose.
+    Otherwise, the pose moves back.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

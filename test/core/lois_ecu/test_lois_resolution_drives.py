@@ -117,10 +117,9 @@ def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
-    """The robot drives back to its start, where the tick counts pass zero while the clock wraps.
+    """The robot drives back to its start, and a read is late just when the board's clock wraps.
 
-    The read at this time is late. The driver does not take the low counts and the low clock for a
-    restart of the board.
+    The driver does not take the low tick counts and the low clock for a restart.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, -2.6)

@@ -105,10 +105,9 @@ def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None
 
 
 def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
-    """The board restarts just when its clock wraps, and the covariance covers the odometry's error.
+    """The board restarts just when its clock wraps, so the driver cannot notice the restart.
 
-    The driver does not notice the restart: if the wheels had rolled back to their start, clock and
-    tick counts would be the same.
+    The covariance covers the resulting error of the odometry.
     """
     bench = Bench("documented")
     begin_drive(bench, 0.3, 1.3, 0.0)
@@ -142,11 +141,9 @@ def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: floa
 
 @pytest.mark.slow
 def test_a_restart_before_the_first_drive_is_noticed() -> None:
-    """The board restarts before its first drive, and the driver notices the restart by the clock.
+    """The board restarts before its first drive, when its tick counts are still zero.
 
-    The tick counts do not show the restart, because they were still zero. Bug: after such a
-    restart, the driver did not write the gains again if ``ticks_period`` was about equal to the
-    period that the board uses after a boot.
+    The driver notices the restart by the clock, and writes the gains again.
     """
     periods_ms = {Stream.TICKS: 400, Stream.ODOMETRY: 400}
     settings = LoisEcuSettings(written={Setting.LEFT_KP: 0.5}, periods_ms=periods_ms)
@@ -166,8 +163,8 @@ FAST_TICKS = 30
 def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
     """Return a ``Translation`` that has received the reports of two fast wheels.
 
-    In each of the first 20 reports, both counts grow by ``FAST_TICKS``. ``steps``: what each later
-    report adds to the counts of the left and the right wheel.
+    In the first 20 reports, each count grows by ``FAST_TICKS``. ``steps``: growth of the left and
+    the right count in each later report.
     """
     settings = LoisEcuSettings(wheel_radius_m=0.03, drive_mode="duty", duty_scale=100.0)
     translation, counts, now = Translation(settings), [0, 0], 0.0
@@ -183,10 +180,9 @@ def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
 
 @pytest.mark.parametrize("right", [-FAST_TICKS, FAST_TICKS])
 def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
-    """The wheels roll back at 150 RPM, in duty mode. The driver does not take this for a restart.
+    """One wheel or both wheels roll back at 150 RPM, in duty mode.
 
-    Regression: the driver took each decrease of the tick counts that meant more than 110 RPM for a
-    restart. The heading went wrong by radians, and the driver discarded commands.
+    The driver does not take this for a restart, and the heading stays right.
     """
     slow = [(-FAST_TICKS // 2, right // 2)]
     translation = fast_wheels(slow + [(-FAST_TICKS, right)] * 22)

@@ -20,10 +20,10 @@ def told(*speeds_rpm: float, tuned: bool = False, every_s: float = GROUP_S) -> R
 
 
 def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands() -> None:
-    """The board reports that a wheel's speed falls to 12 RPM, and then 12 RPM twice more.
+    """A wheel's reported speed falls to 12 RPM, and is then repeated twice.
 
-    The equal reports make the detector certain that the wheel is at rest: the board repeats the
-    last speed of a stopped wheel.
+    The detector is certain that the wheel is at rest: the board repeats the last speed of a stopped
+    wheel.
     """
     assert told(31, 28, 19, 12).chance == 0.0
     assert 0.0 < told(31, 28, 19, 12, 12).chance < 1.0
@@ -31,11 +31,10 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """The board reports that a wheel's speed falls to 20 RPM, and then 20 RPM three times more.
+    """A wheel's reported speed falls to 20 RPM, and is then repeated, as if the wheel had stopped.
 
-    The equal reports make the detector certain that the wheel is at rest: the board repeats the
-    last speed of a stopped wheel. Two repetitions are not enough, because a wheel seldom stops
-    directly from 20 RPM.
+    The detector is certain of rest only after three repetitions: wheels seldom stop directly from
+    20 RPM.
     """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
@@ -44,11 +43,10 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
-    """The board reports that a wheel's speed falls to 28 RPM, and then 28 RPM many times.
+    """A wheel's reported speed falls to 28 RPM, and is then repeated many times.
 
-    The detector is certain that the wheel is at rest, because the speed of a rolling wheel is never
-    that steady. A wheel does not stop directly from 28 RPM, so the board has measured the 28 RPM
-    wrongly.
+    The detector becomes certain that the wheel is at rest: the speed of a rolling wheel is never
+    that steady.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0
@@ -98,11 +96,10 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """The detector finds a wheel at rest although the board has not reported the fall of its speed.
+    """The driver estimates 28 RPM for a wheel, and then the board reports 14 RPM three times.
 
-    The board reports no speeds while both wheels have the same speed, and the driver estimates 28
-    RPM. Then the board reports 14 RPM three times: the speed has fallen, and the board repeats the
-    last speed of a stopped wheel.
+    The detector is certain of the wheel's rest: the board repeats the last speed of a stopped
+    wheel.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -113,10 +110,10 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 
 
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
-    """The detector finds a wheel at rest although most reports of its falling speed are lost.
+    """Most reports of a wheel's falling speed are lost.
 
-    The remaining reports are 0.5 s apart, and show a fall to 9 RPM. Two more reports of 9 RPM make
-    the detector certain: the board repeats the last speed of a stopped wheel.
+    After a fall to 9 RPM and two repetitions, the detector is certain of rest: the board repeats
+    the last speed of a stopped wheel.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
@@ -133,10 +130,10 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """If most reports are lost, eleven equal reports make the detector certain of a wheel's rest.
+    """Most reports are lost, perhaps also the fall to the speed from which a wheel has stopped.
 
-    The board repeats the last speed of a stopped wheel, and the fall to this speed may be among the
-    lost reports. If no report is lost, the same speeds do not show rest.
+    Eleven equal reports make the detector certain of the wheel's rest; without losses, they show no
+    rest.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2

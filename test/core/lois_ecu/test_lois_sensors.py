@@ -133,10 +133,10 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """After a reset of the odometry, headings of 120° are still accepted if the robot faces 120°.
+    """The odometry is reset while the robot faces 120°.
 
-    A board that faces north may report 120° falsely, so the driver rejects 120° while it expects
-    north. The reset does not change the heading that the driver expects.
+    The driver still accepts headings of 120°, because the reset does not change the heading that
+    the driver expects.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

@@ -57,8 +57,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 def test_a_twist_is_said_and_understood() -> None:
     """``velocity`` encodes a twist as a line with two RPM values, and ``meaning`` decodes the line.
 
-    A twist of 0.2723 m/s straight ahead gives 20 RPM for each wheel. The decoded twist differs from
-    the encoded twist only by the rounding.
+    The decoded twist differs from the encoded twist only by the rounding.
     """
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
@@ -94,8 +93,7 @@ def encode_command_duty(left: int, right: int) -> bytes:
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
     """The driver sends RPM 0/0 before each of the first three set-points after a Stop.
 
-    After a wheel has stopped, the board still uses the speed that it measured last, and might never
-    start the wheel again. RPM 0/0 clears this old speed.
+    RPM 0/0 clears the board's old measured speed, with which a wheel might never start again.
     """
     ecu = started()
     drive = b":020014001438\n"

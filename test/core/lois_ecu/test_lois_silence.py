@@ -12,7 +12,7 @@ from lois_bench import FIRMWARE, Bench
 
 
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> Bench:
-    """Return a test bench after a drive with a lost connection, a second drive, and a stop.
+    """Return a bench after a drive with a lost connection, a second drive, and a stop.
 
     * ``vx``: speed of both drives, in m/s.
     * ``seconds``: how long the connection is lost, in s.

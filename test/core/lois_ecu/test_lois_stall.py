@@ -34,7 +34,7 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
     """Return the times in s, within six seconds, at which a wheel is reported as stalled.
 
     * ``ticks``: new ticks of the left and the right wheel in each 0.2 s.
-    * ``ways_m``: distance in m by which the board's own pose (report 0x20) moves in each 0.2 s.
+    * ``ways_m``: motion of the board's own pose (report 0x20) in each 0.2 s, in m.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -78,9 +78,9 @@ def looks_stalled(
 ) -> bool:
     """Return whether a wheel looks stalled.
 
-    * ``rpm``: reported speeds of left and right wheel, one pair every ``every_s``.
+    * ``rpm``: reported speeds of left and right wheel, every ``every_s``.
     * ``targets``: set-points of left and right wheel, in RPM.
-    * ``resting``: for each wheel, whether the odometry assumes that it is at rest.
+    * ``resting``: for each wheel, whether the odometry assumes rest.
     """
     watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
@@ -111,8 +111,7 @@ def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> N
 def test_a_few_equal_speeds_on_a_bad_line_do_not_show_a_stall() -> None:
     """Most reports are lost, and the board reports the same speed of a wheel for 3 s.
 
-    The driver does not regard the wheel as stalled, because its speed may have been different in
-    the lost reports. After three more equal reports, the driver regards the wheel as stalled.
+    The driver regards the wheel as stalled only after three more equal reports.
     """
     assert not looks_stalled([(-10, 8 + step % 3) for step in range(7)], every_s=0.5)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(10)], every_s=0.5)
@@ -128,11 +127,9 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, a constant reported speed above the set-point does not show a stall.
+    """With feed-forward, a wheel may roll at a constant speed above its set-point.
 
-    Feed-forward gives power at any speed, so the wheel may roll at this speed. But if the other
-    wheel's reported speed changes meanwhile, the wheel is stalled: the board repeats the last speed
-    of a wheel at rest.
+    This speed shows a stall only if the other wheel's reported speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -146,20 +143,18 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """Two wheels that both turn at about 1.3 times their set-points do not look stalled.
+    """Two wheels turn at about 1.3 times their set-points, as can happen in backward motion.
 
-    In backward motion, both wheels can really roll too fast, by about the same factor. If only one
-    wheel is this fast, it looks stalled.
+    They do not look stalled. If only one wheel is this fast, it looks stalled.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """The detector reports a wheel that the odometry assumes to be at rest and that gets no power.
+    """The odometry assumes a wheel at rest, but the board reports a speed above the set-point.
 
-    The board repeats the wheel's last speed, which is just above the set-point. So the speed
-    controller gives the wheel no power, and the wheel cannot start by itself.
+    The wheel looks stalled: at this speed, the speed controller gives it no power to start.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -197,16 +192,9 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     right_rpm: int,
 ) -> None:
-    """A wheel for which the board always reports the same high speed may be at rest, or may roll.
+    """The board always reports the same high speed of a wheel, which may roll or be at rest.
 
-    The driver provides for both cases:
-
-    * If the wheel is at rest, the reported speed is old, and the board may give the motor no power.
-      So the driver sends RPM 0/0, which clears this speed.
-    * If the wheel rolls, the robot has driven. So the odometry keeps the driven distance.
-
-    ``right_rpm``: reported speed of the right wheel, in RPM. The set-point is −31 RPM, at which the
-    wheel rolls at −30 RPM, or at −68 RPM if the controller gives full power.
+    The driver sends RPM 0/0 to start a wheel at rest, but keeps the driven distance.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

@@ -79,12 +79,11 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode, and the driver reports once that the mode has ended.
+    """The user ends a terminal mode, which has overwritten a factor of the wheel speed.
 
-    The terminal mode has overwritten the setting "left short correction", a factor in the
-    measurement of the left wheel's speed. The driver restores this factor.
+    The driver restores this factor (left short correction), and reports the end of the mode once.
 
-    ``hears``: whether the board receives the driver's lines in the first 1.3 s.
+    ``hears``: whether lines reach the board in the first 1.3 s.
     """
     bench = Bench(firmware)
     configure(bench, GPS)

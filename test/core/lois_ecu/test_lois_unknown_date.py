@@ -36,7 +36,7 @@ class GpsRig(Rig):
     """A robot whose GPS may have no date.
 
     * ``dated``: whether the GPS has a date.
-    * ``unknown``: value that the GPS sends instead of a date if it has none.
+    * ``unknown``: what the GPS sends instead of a date.
     * ``requests``: times at which the driver requested a date, in s.
     """
 

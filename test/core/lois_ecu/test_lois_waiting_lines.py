@@ -46,10 +46,9 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While the robot drives, the next wake-up of the session is always in the future.
+    """The robot drives, and the board has not confirmed its settings.
 
-    The board has not confirmed its settings. The driver does not repeat settings during a drive, so
-    the pacer must not run again and again because of the settings.
+    The session's next wake-up is always in the future, so the pacer does not run without a pause.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
@@ -75,8 +74,7 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """While the robot drives, the LED's line comes at least 14.5 ms after a motion line.
 
-    The board may miss all bytes for up to 13 ms. If it missed the end of the motion line and the
-    start of the LED's line, it could read the remaining characters as a wrong motion line.
+    A board that misses bytes for 13 ms could otherwise join both to a wrong motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

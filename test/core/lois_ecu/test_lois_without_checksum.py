@@ -38,13 +38,10 @@ def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
 
 @pytest.mark.slow
 def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
-    """The driver writes the settings during a drive, and the left short correction keeps its value.
+    """The driver writes the settings in a drive.
 
-    This correction is a factor in the measurement of the left wheel's speed. The driver writes the
-    settings five times.
-
-    Regression: the fifth time, the driver wrote the mode line last. This line sets the correction
-    to almost 0.
+    The left short correction (a speed factor) keeps its value. Regression: the last line was the
+    mode line, which sets the correction to almost 0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
@@ -60,10 +57,10 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
-    """The left short correction is right after each writing of the settings, even on a bad line.
+    """The driver writes the settings on a line that loses 1 % of the bytes.
 
-    The line that sets the mode also sets this correction to almost 0, and the driver restores it.
-    Regression: the driver sent only one line to restore it, and this line was often lost.
+    The left short correction (a speed factor), which the mode line sets to almost 0, is right after
+    each writing.
     """
     rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
     rig.run(6.0)
@@ -79,13 +76,10 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
 
 @FIRMWARE
 def test_a_board_that_expects_checksums_unnoticed_drives_again_after_a_rest(firmware: str) -> None:
-    """A board that works without checksums receives a damaged line, and then expects checksums.
+    """A board that works without checksums begins to expect them, and its wheels do not start.
 
-    The wheels do not start. While the robot is at rest, the driver writes the mode line with and
-    without a checksum. The next drive moves the robot.
-
-    Regression: the driver wrote the mode line only without a checksum, so the board ignored all
-    lines.
+    While the robot rests, the driver also writes the mode line with a checksum. The next drive
+    succeeds.
     """
     bench = Bench(firmware, LoisEcuSettings(with_sum=False))
     bench.run(5.0)
@@ -103,12 +97,9 @@ def test_a_board_that_expects_checksums_unnoticed_drives_again_after_a_rest(firm
 def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
     firmware: str, *, with_sum: bool, commands: bool
 ) -> None:
-    """The driver stops a rolling board whose checksums another program has switched on or off.
+    """A rolling board's checksum setting differs from the driver's when the port is opened.
 
-    The board's checksum setting is the opposite of the driver's. A Stop that the board obeys
-    arrives within half a second after the port is opened, even if the user commands a motion.
-
-    Regression: the robot rolled on for seconds, because the board ignored each Stop.
+    A Stop that the board obeys arrives within half a second, even if the user commands a motion.
     """
     lois = LoisRobot(firmware)
     board: Any = lois.board

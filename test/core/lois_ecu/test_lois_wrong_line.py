@@ -71,13 +71,9 @@ def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
 
 
 def test_a_board_without_checksums_is_set_right_although_its_ticks_are_lost() -> None:
-    """Another program has switched the board's checksums off, and the line loses all tick reports.
+    """Another program has switched the checksums off, and the line loses all tick reports.
 
-    The driver switches the checksums on within ten seconds, and sends a Stop that the board obeys.
-
-    Regression: the driver waited for ticks, so the checksums stayed off, and the board obeyed no
-    Stop. If a Stop lost two characters, the board used the checksum of the Stop as the duty of a
-    wheel.
+    Within ten seconds, the driver switches the checksums on, and sends a Stop that the board obeys.
     """
     _, robot = MAKERS["lois_ecu"]()
     robot.board.receive(b":11000000043e\n")
