@@ -17,8 +17,7 @@ ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
 """``ROUNDING_M``, ``ROUNDING_RAD``: limits for the odometry's rounding error, in m and in rad.
 
-The error comes from rounded deltas. It grows with each delta, until the next pose of the board
-corrects the odometry. A larger error fails the test.
+The error from rounded deltas grows until the next pose of the board. A larger error fails the test.
 """
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 

@@ -27,8 +27,8 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 class Line:
     """A line that can lose frames, from a simulated OmniBot board to the driver's odometry.
 
-    All readings of the board's IMU are zero. ``loses``: function that returns, for a frame's bytes
-    and the time, whether the frame is lost.
+    All IMU readings are zero. ``loses``: function that returns, for a frame's bytes and the time,
+    whether the frame is lost.
     """
 
     def __init__(

@@ -75,10 +75,9 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """After the motion monitor has stopped a robot for the first time, ~/start is not needed.
+    """The motion monitor stops a robot twice, 61 s apart, and once more just after ~/start.
 
-    The same applies to a stop more than a minute after the previous stop, and to the first stop
-    after a call of ~/start.
+    After each stop, the robot can drive again without ~/start.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):

@@ -87,8 +87,8 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
     """A board restarts and boots for 0.4 s, while the user commands motion.
 
-    The driver sends its last motion frame before the boot ends. After the boot, the board is
-    paused, and could read a byte of a motion frame as the letter S (start).
+    No motion frame is sent after the boot: the paused board could read a byte of the frame as S
+    (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()

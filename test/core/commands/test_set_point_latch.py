@@ -40,10 +40,10 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """A user latches the e-stop just after a command. The driver at once sends the e-stop twice.
+    """A user latches the e-stop just after a command.
 
-    Then the driver repeats the e-stop without end. Each transmission is ES and Stop, because some
-    firmware does not know ES.
+    The driver sends ES and Stop at once, twice, and then repeats both without end. Both are needed:
+    some firmware does not know ES.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

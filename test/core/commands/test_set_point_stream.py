@@ -123,11 +123,10 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """During a drive, the driver sends a letter such as S (start), and then the last command again.
+    """During a drive, the driver sends a letter, such as S (start).
 
-    The driver sends zeros before the letter. If the board has lost the end of the last frame, these
-    zeros may complete the frame to a wrong command. The repeated command replaces the wrong
-    command.
+    The driver then repeats the command, because the zeros before the letter can turn a damaged
+    frame into a wrong command.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

@@ -38,9 +38,9 @@ def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """In a turn at 0.5 rad/s about a point 1 m to its left, the robot moves at 0.5 m/s.
+    """The wheels run at 0.4 m/s and 0.6 m/s about a point 1 m to the left of the robot.
 
-    The wheels run at 0.4 m/s on a radius of 0.8 m, and at 0.6 m/s on 1.2 m.
+    The robot moves at 0.5 m/s and turns at 0.5 rad/s.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 

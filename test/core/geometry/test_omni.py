@@ -25,10 +25,7 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 
 @given(twists)
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
-    """The wheel rates are the rim speeds of the manual's equations, divided by the wheel radius.
-
-    Rims A and B move at ∓cos 30° Vx - sin 30° Vy - L Ω, and rim C at Vy - L Ω. L: base radius.
-    """
+    """The wheel rates are the rim speeds of the manual's equations, divided by the wheel radius."""
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
     rim_b = 0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -42,8 +39,7 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 ) -> None:
     """The body twist is computed from wheel rates with the odometry matrix of the manual.
 
-    The manual has two forms of this matrix. Only the form with 1/(2 cos 30°) is right; with the
-    other form, the velocity along x would be 3/4 of the true one.
+    Of the manual's two forms of this matrix, only the form with 1/(2 cos 30°) is right.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258

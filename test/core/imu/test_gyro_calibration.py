@@ -48,9 +48,9 @@ def stand(
 ) -> None:
     """Give readings at 100 Hz to the calibration, and a displacement after every fourth reading.
 
-    ``rates``: gyro readings in rad/s. ``force``: specific force in every reading, in m/s².
-
-    ``rolling``: x and y in m, and turn in rad, of each displacement; None: no displacements.
+    * ``rates``: gyro readings in rad/s.
+    * ``force``: specific force in m/s².
+    * ``rolling``: x and y in m, and turn in rad, of each displacement; None: no displacements.
     """
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):
