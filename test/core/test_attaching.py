@@ -48,10 +48,9 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
     lost: tuple[int, ...], turn: float, frame: str
 ) -> None:
-    """The driver starts while the robot moves. Displacements are lost before two poses agree.
+    """The driver starts while the robot moves, and displacements are lost before two poses agree.
 
-    The odometry interpolates the lost motion, and keeps this motion when two poses agree with each
-    other. All later poses agree with the odometry.
+    The odometry keeps the interpolated motion, and agrees with all later poses.
     """
     odometry, trip, missing, estimates = Odometry(SETTINGS), Trip(0.7), 0, []
     for number in range(60):
@@ -68,10 +67,9 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
 
 
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
-    """A pose has damaged values and a damaged count. After the next pose, odom has no error.
+    """A pose has damaged values and a damaged count, so the next pose seems to show a restart.
 
-    Because of the damaged count, the next pose seems to come from a restarted board. But the next
-    pose lies where the odometry expects it, and removes the error.
+    This next pose lies where the odometry expects it, and removes the error from odom.
     """
     odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
     for number in range(30):
@@ -142,10 +140,10 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """If two poses agree, the odometry uses their heading, even if the poses come late.
+    """For 1 s, the board sends no pose, so the odometry assumes heading 0.
 
-    For 1 s, the board sends no pose, so the odometry assumes heading 0. Then two equal poses come.
-    The odometry uses their heading for later motion, and odom does not jump.
+    Then two equal poses come. The odometry uses their heading for later motion, and odom does not
+    jump.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):

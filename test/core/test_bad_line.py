@@ -70,10 +70,10 @@ class Drive:
 @pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 1.0), ("body", 0.5)])
 def test_after_a_minute_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: float) -> None:
-    """On a line that loses 1 byte in 1000, and bursts of bytes, odom is right within 2 cm.
+    """A line loses 1 byte in 1000, and bursts of bytes.
 
-    At most one IMU reading per minute is wrong. After 1.5 s without losses, odom is right within
-    1.5 mm.
+    Odom is right within 2 cm, and within 1.5 mm after 1.5 s without losses. At most one IMU reading
+    per minute is wrong.
     """
     drive = Drive(frame, LineFaults(lose=0.001, burst=0.0005))
     drive.run(60.0 * minutes)

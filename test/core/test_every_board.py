@@ -146,8 +146,8 @@ def reconnect(bench: AnyBench) -> None:
 def test_the_answer_to_a_start_says_that_the_estop_is_latched(name: str) -> None:
     """The user calls ~/start on a running board while the e-stop is latched.
 
-    The start succeeds, because the board runs. Its answer says that the robot does not move until
-    the e-stop is released. After the release, the answer no longer says so.
+    The start succeeds, and its answer says that the e-stop is latched. After the release, the
+    answer does not say so.
     """
     bench = nominal(name)
     for latched in (True, False):
@@ -217,9 +217,9 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_again(
     bench: AnyBench,
 ) -> None:
-    """The driver gets no proof of a stop, so it repeats Stop for 5 s, in case the line works again.
+    """In a drive, the line is cut in both directions.
 
-    After 4 s, the board receives data again, so the robot stops. The driver still receives nothing.
+    After 4 s, only the board receives again. The driver still repeats Stop, so the robot stops.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False

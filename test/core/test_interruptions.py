@@ -88,10 +88,10 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
-    """A paused board restarts while the robot rests. Odom does not move to the board's new origin.
+    """A paused board restarts at rest, and the driver misses its frames for 4 s.
 
-    The restarted board sends frames for 4 s, and the driver misses these frames. So the first count
-    that the driver gets is larger than the last count before the restart.
+    So the first count is larger than the last count before the restart. Odom does not move to the
+    board's new origin.
     """
     on = line(0, frame=frame)
     on.drives = False
@@ -110,10 +110,9 @@ def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame:
 def test_a_restarted_board_that_first_moves_unheard_does_not_move_odom_to_its_origin(
     frame: str,
 ) -> None:
-    """After a restart of the board in a drive, odom continues from its last pose.
+    """A board restarts in a drive, and the robot drives for 0.4 s before frames arrive.
 
-    No frames arrive until the robot has driven for 0.4 s after the restart. So the board's first
-    poses are neither at its new origin nor at the old place.
+    Odom continues from its last pose, and does not move to the board's new origin.
     """
     on = Line(BoardSettings(seed=1, frame=frame, running=True), seed=1)
     on.run(4.0)
@@ -223,8 +222,8 @@ def float32(value: float) -> float:
 def test_wheel_counts_go_through_the_kinematics() -> None:
     """Deltas in wheel counts are converted to the motion of the robot.
 
-    * All wheels turn backward by 1/8 of a turn: the robot turns left in place.
-    * Wheel B turns forward, and wheel A backward: the robot drives straight ahead.
+    * All wheels backward by 1/8 of a turn: the robot turns left in place.
+    * Wheel B forward, wheel A backward: the robot drives straight ahead.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

@@ -78,7 +78,7 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """The driver must wake when the next limit for a silence of the board is reached.
+    """The driver must wake at the next limit for a silence of the board.
 
     * Driven robot: 0.5 s, when the driver ends the command.
     * Otherwise: 2 s, when the driver regards the board as silent.

@@ -55,10 +55,9 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A robot that is at rest from the beginning of a long task does not make the task fail.
+    """A robot is at rest when a long task begins, and is later driven and stopped.
 
-    In the same task, the robot is then driven and stopped. This stop makes the task fail, and the
-    message says that the robot was stopped.
+    Only this stop makes the task fail, and the message says that the robot was stopped.
     """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)

@@ -38,8 +38,7 @@ class Driver(NamedTuple):
     * ``proved``: whether a check has just shown that the IMU works.
     * ``unanswered``: the number of stops without an answer.
     * ``moved``: whether the last motion was a controlled move (``MOVES``).
-    * ``counted``: whether the encoder was read since the last stop. The driver reads the encoder
-      only when late commands can do no harm.
+    * ``counted``: whether the encoder was read since the last stop.
     * ``greeted``: whether the server has confirmed a stop at least once.
     * ``underway``: whether the motors may be under direct control (MCS), as far as the driver
       knows.
@@ -211,8 +210,8 @@ def sweeps_first(driver: Driver) -> bool:
 def _asked(world: World) -> Step:
     """Return the model's step in which the driver finds out which motion is in progress.
 
-    The driver does this after it has used the stop port. A lost reply is not modelled, because it
-    would not change the state of server, driver or network.
+    The driver does this after it has used the stop port. A lost reply changes no state, so the
+    model omits it.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -279,14 +278,14 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 
 
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
-    """Yield the conclusions that the driver may draw from a reply that it receives.
+    """Yield the conclusions that the driver may draw from a reply.
 
-    ``late``: whether the reply may belong to an earlier command. If so, the driver never takes it
-    for the answer to a check, a controlled move or MSM (end of the motors' direct control). Checks
-    and moves last so long that no late reply can arrive at their end.
+    ``late``: whether the reply may belong to an earlier command. Such a reply never answers a
+    check, a controlled move or MSM (end of direct control).
     """
     driver = world.driver
     state = driver.state
+    # A check or a move lasts so long that no late reply to an earlier command arrives at its end.
     if state is State.CHECKING and not late:
         copies = tuple(copy for copy in world.copies if copy != "CHECK")
         refused = driver.underway or reply == "conflict"

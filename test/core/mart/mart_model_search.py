@@ -25,12 +25,7 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong with the server or the robot, or an empty text if nothing is wrong.
 
-    * Always wrong: the server has crashed.
-    * Wrong if the IMU works and the driver has not given the server up: the command port hangs. The
-      driver gives the server up as lost, or after more than ``UNANSWERED`` stops without an answer.
-    * Wrong in the same case, except while the driver is finding out which motion is in progress:
-      the next stop will hang, the server refuses motions and the driver does not know this, or
-      nothing stops the robot.
+    If the IMU is dead, or the driver has given the server up, only a crash is wrong.
     """
     server, driver = world.server, world.driver
     if server.crashed:
@@ -41,6 +36,7 @@ def trouble(world: World) -> str:
         return ""
     if server.port == "hung":
         return "the command port hangs"
+    # Until the driver knows which motion is in progress, the states below are allowed.
     if asks:
         return ""
     if server.released:
@@ -77,9 +73,9 @@ def _can_stop(world: World) -> bool:
 class Found(NamedTuple):
     """The result of a search.
 
-    * ``worlds``, ``steps``: number of reachable worlds (states of server, driver and network), and
-      of steps between them.
-    * ``bad``: the steps to the first forbidden world, then what is wrong in it. Empty if none was
+    * ``worlds``: number of reachable states of server, driver and network.
+    * ``steps``: number of steps between these states.
+    * ``bad``: steps to the first forbidden state, then what is wrong in it; empty if none was
       found.
     """
 

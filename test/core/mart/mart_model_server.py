@@ -25,12 +25,11 @@ KIND: Final = {
 class Server(NamedTuple):
     """The state of the modelled server.
 
-    * ``port``: state of the command port. "free": it accepts commands. "busy": a controlled move is
-      in progress. "waits": it waits for an IMU that does not work. "hung": it does not answer any
-      more.
+    * ``port``: state of the command port: "free", "busy" (a controlled move is in progress),
+      "waits" (for an IMU that does not work) or "hung" (no more answers).
     * ``released``: whether the stop port has stopped a motion that the server still regards as in
       progress.
-    * ``manual``: whether the motors are under direct control (MCS). The server then refuses
+    * ``manual``: whether the motors are under direct control (MCS); the server then refuses
       motions.
     """
 

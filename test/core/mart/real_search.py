@@ -2,9 +2,9 @@
 
 """A bounded search that runs the real driver against the simulated firmware, in many trials.
 
-In most trials, a user commands a sequence of *wishes*, such as "forward" or "stop", and one
-datagram has a *fate*: it is lost, late or doubled, or the IMU dies when it is sent. In the others,
-a driver starts while the server may be executing a command.
+In most trials, a user gives commands (*wishes*), and one datagram has a *fate*: it is lost, late or
+doubled, or the IMU dies when it is sent. In the others, a driver starts while the server may be
+executing a command.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets of trials.
 """
@@ -47,8 +47,7 @@ Each is disturbed in a trial of its own. Regular queries and their replies are n
 PROOF_S: Final = 0.25
 """Longest time in s after the failure of the IMU in which the driver may still start a motion.
 
-Later, a start is a failure of the driver: its check of the IMU before the start must find the
-failure.
+The driver's check of the IMU must prevent a later start.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
@@ -185,13 +184,10 @@ def eights() -> Iterator[Trial]:
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield the trials of one sequence of user commands, with one disturbed datagram in each trial.
+    """Yield trials of one sequence of user commands, each with one disturbed datagram.
 
-    ``wishes``: the names of the commands, in order.
-
-    In each direction, only the first datagrams are disturbed, at most ``MOST_DATAGRAMS`` for each
-    command. Each of these datagrams is disturbed in four trials: once in each way that ``FATES``
-    lists.
+    In each direction, only the first datagrams are disturbed: ``MOST_DATAGRAMS`` for each command.
+    Each of them meets every fate in ``FATES``.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

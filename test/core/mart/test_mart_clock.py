@@ -58,17 +58,17 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
     """Before the first drive, the driver sets the server's clock (UTC) without waiting.
 
-    TIME sets the clock to a full minute, perhaps back. After a drive, this does harm, so the driver
-    waits for the end of a minute.
+    TIME may then set the clock back. After a drive, this does harm, so the driver waits for the end
+    of a minute.
     """
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """The user sets the server's clock back between two drives. The second drive needs two starts.
+    """The user sets the server's clock back between two drives.
 
-    After the first start (RM, forward), the server reports a heading of about 1e15°, which the
-    driver cannot use. So the driver starts the drive again. One notice names the clock.
+    The second drive needs two starts (RM), because the first makes the server report an unusable
+    heading. One notice names the clock.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

@@ -131,10 +131,10 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """After a missing reply to a sonar query, the next sonar query waits: the reply may still come.
+    """A sonar query gets no reply.
 
-    ENC (encoder query) is sent at once. The reply to ENC is regarded as doubtful, because a late
-    sonar reply would look the same.
+    The next sonar query waits, because the reply may still come. ENC (encoder query) is sent at
+    once, and its reply is doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -213,10 +213,10 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """The driver sends two stops, and only a reply that cannot be a copy proves a stop.
+    """The driver sends a stop, and again after 0.3 s.
 
-    The first stop may overtake the start, so the reply to it proves nothing. A copy of this reply
-    can arrive until 0.6 s after the first stop. So only a reply that arrives later proves the stop.
+    Only a reply that comes more than 0.6 s after the first stop proves the stop: an earlier reply
+    may be a copy.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -298,10 +298,9 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """The odometry does not use an old encoder count that arrives in place of the angle of a turn.
+    """The reply with the angle of a turn is in fact an old encoder count, 3.
 
-    The count is 3, and a turn by 3° contradicts the present encoder count. So the odometry computes
-    the turn from the encoder count alone.
+    A turn of 3° contradicts the encoder, so the odometry computes the turn from the encoder alone.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

@@ -58,6 +58,7 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
     ("motion", "firmware"),
     [
         ((0.3, 0.0), "firmware"),
+        # "source" reports headings only in forward drives
         ((0.3, 0.0), "source"),
         ((-0.2, 0.0), "firmware"),
         ((0.0, 0.5), "firmware"),
@@ -66,11 +67,9 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """If the IMU dies in a motion, the driver stops the robot and refuses further motion.
+    """The IMU dies in a motion.
 
-    After a restart of the server with a working IMU, motion is allowed again. The simulated server
-    "source" reports headings only in forward drives, so "source" is tested only with a forward
-    drive.
+    The driver stops the robot, and refuses motion until the server is restarted with a working IMU.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

@@ -139,10 +139,9 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 
 
 def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() -> None:
-    """To download the log, the driver sends EXIT, which ends the server. But the server is silent.
+    """The server does not answer EXIT, which downloads its log and ends the server.
 
-    The result tells the user to copy the file from the controller. It does not say "call again",
-    because another call cannot help.
+    The result tells the user to copy the file from the controller, not to call again.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -250,10 +249,9 @@ def with_a_copy_of_the_last_ok(bench: MartBench, job: Job) -> JobDone:
 
 
 def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
-    """A gyro calibration ends with ``ok``, and the user requests the server's log at once.
+    """A gyro calibration ends with ``ok``, and EXIT requests the server's log at once.
 
-    The driver sends EXIT, which downloads the log. A copy of the ``ok`` arrives before the server's
-    reply to EXIT. The driver ignores the copy, and downloads the log.
+    A copy of the ``ok`` arrives first. The driver ignores the copy, and downloads the log.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -264,10 +262,9 @@ def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
 
 
 def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
-    """The command LOG, which starts a log, is lost, and a copy of an earlier ``ok`` arrives.
+    """LOG (start of a log) is lost, and a copy of an earlier ``ok`` arrives.
 
-    The driver does not take the copy for the reply to LOG, and knows that no log was started. So it
-    later refuses to download a log. Such a download would end the server.
+    The driver knows that no log was started, and refuses a download, which would end the server.
     """
     bench = MartBench().ready()
     assert bench.job(Job.BIAS).success
@@ -281,10 +278,9 @@ def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
 
 
 def test_a_server_that_ends_without_a_file_has_not_sent_its_log() -> None:
-    """The driver sends EXIT to download a log, and the server has no log any more.
+    """Without a log, the server answers EXIT (download of the log) only by ``ok``, and ends.
 
-    EXIT ends the server in any case. The server answers only ``ok``, without a file. The download
-    fails, and its result says that the server has ended.
+    The download fails, and its result says that no file came.
     """
     bench = MartBench("documented").ready()
     assert bench.job(Job.LOG).success

@@ -144,10 +144,10 @@ def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
 
 
 def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
-    """A download from the server loses one piece, and the driver waits for this piece for 1 s.
+    """A download loses one piece, and fails after a wait of 1 s.
 
-    The download then fails. The driver does not take the silence for a restart of the server, and
-    begins the next drive at once.
+    The driver does not take the silence for a restart of the server, and begins the next drive at
+    once.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 2.0)

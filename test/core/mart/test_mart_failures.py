@@ -137,11 +137,9 @@ def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
 def test_opposite_angles_of_gyro_and_wheel_are_told_by_the_parameters_that_invert_them(
     encoder_sign: int, settings: MartSettings
 ) -> None:
-    """The encoder or the heading has a wrong sign, and the robot turns on the spot.
+    """The encoder or the heading has a wrong sign, so both show opposite angles of a turn.
 
-    The heading and the right wheel's encoder then show opposite angles. The driver's notice names
-    the parameters ``heading_inverted`` and ``encoder_inverted``, and does not mention a stuck
-    wheel.
+    The driver's notice names ``heading_inverted`` and ``encoder_inverted``, not a stuck wheel.
     """
     bench = MartBench("source", settings=settings, encoder_sign=encoder_sign).ready()
     bench.command(0.0, 0.5, 3.0)
@@ -181,10 +179,9 @@ def test_nobody_answers() -> None:
 
 @pytest.mark.parametrize("word", [b"ENC", b"L"])
 def test_a_command_that_the_server_does_not_know_is_named_as_the_reason(word: bytes) -> None:
-    """The server does not know ENC or L, two commands that the manual does not list.
+    """The server does not know ENC or L, so the robot does not turn.
 
-    So the robot does not turn. The driver reports that the server does not know the command, and
-    does not suspect an obstacle.
+    The driver reports the unknown command, and does not suspect an obstacle.
     """
     bench = MartBench("documented")
     inner = bench.robot.receive
@@ -212,10 +209,10 @@ def translate(bench: MartBench, texts: dict[bytes, bytes]) -> None:
 
 @pytest.mark.parametrize("text", ["fail command not supported", "fail", "fail no motion"])
 def test_a_server_with_an_unknown_answer_to_a_stop_is_named(text: str) -> None:
-    """The server answers the stop SRM by a text that the driver does not expect.
+    """The server answers a stop by an unexpected text.
 
-    The driver does not know whether the robot moves, so it stays ``connecting``. One notice quotes
-    the server's answer, so that the user does not look for a fault of the cable.
+    The driver stays ``connecting``, because the robot may be moving, and one notice quotes the
+    answer.
     """
     bench = MartBench()
     translate(bench, {b"fail no motion in progress": text.encode()})

@@ -112,10 +112,9 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 
 
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
-    """A straight move is stopped after 80 s (about 20 m), but the robot reaches a goal at 30 m.
+    """The goal is 30 m away, and the first move is stopped after 80 s (about 20 m).
 
-    The driver gives up a goal after a certain number of moves. The stop at 80 s sets the count of
-    moves to zero, so the robot can reach goals that are far away.
+    The limit of moves for a goal then counts from zero, and the robot arrives.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)

@@ -39,23 +39,19 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed: int) -> None:
-    """The network loses a quarter of all datagrams. The robot's goal is reached or discarded.
+    """The network loses a quarter of all datagrams.
 
-    Before a move, the driver waits until no HELLO (name query) is on its way. On such a network,
-    this wait might never end, so it has a limit.
+    The goal is still reached or discarded, because the driver's wait for late HELLOs (name queries)
+    before a move is limited.
     """
     bench = on(NetworkFaults(lose=0.25, delay_s=0.01), EVERY_FIRMWARE[seed % 3], seed)
     reach(bench, Pose(0.6, 0.3, 1.5))
 
 
 def test_a_goal_that_another_cause_ends_is_noticed() -> None:
-    """The tests' function ``reach`` waits for the end of a goal. It notices an end by the e-stop.
+    """The e-stop ends a goal, and the driver does not report this end.
 
-    After an e-stop, the driver does not report that the goal is over, so ``reach`` also asks
-    whether the session has dropped the goal. ``reach`` returns within 30 s.
-
-    Regression: the driver ended a goal because the robot was pushed. ``reach`` did not notice this,
-    and a measurement of many goals was aborted.
+    The tests' function ``reach`` returns nevertheless, within 30 s.
     """
     bench = MartBench("source").ready()
 
@@ -72,10 +68,9 @@ def test_a_goal_that_another_cause_ends_is_noticed() -> None:
 
 
 def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -> None:
-    """A move waits up to 2 s while an earlier HELLO (name query) may still reach the server.
+    """A goal is cancelled while its move waits for a late HELLO (name query).
 
-    If the goal of the move is cancelled during this wait, the wait of the next goal is not shorter.
-    Regression: the limit of 2 s was counted from the first wait.
+    The wait of the next goal is not shorter: its limit is also 2 s.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.3, 0.0, 0.0)
@@ -201,11 +196,9 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 
 
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
-    """The first move of a robot goes only half as far as requested, and the odometry stays right.
+    """A robot's first move goes half as far as requested, and the queries after it are lost.
 
-    The network loses the driver's queries after the move, so the driver sends a stop in case a copy
-    of the move has started a second run. The driver has not learned yet how far this robot drives,
-    so it assumes that there was only one run.
+    The driver does not assume that the network duplicated the move, and the odometry stays right.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -227,11 +220,9 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
-    """The reply to a controlled turn is lost, so the driver sends a stop.
+    """A controlled turn's reply is lost, and the reply to a stop shows that the turn is complete.
 
-    The server answers "no motion", which shows that the turn is complete. The encoder count began
-    at zero with the turn. So the driver uses the complete count for the turn, and does not subtract
-    the last count before the turn.
+    The odometry uses the whole encoder count, which began at zero with the turn.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -248,10 +239,9 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 
 
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
-    """The robot turns, and then drives straight. The driver reads the heading only after the drive.
+    """The robot turns, then drives straight, and the driver reads the heading only after the drive.
 
-    The odometry has already added the turn by the encoder count. The heading that is read contains
-    the same turn, and the odometry does not add it again.
+    The odometry does not add the turn, computed from the encoder, a second time.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))
@@ -329,10 +319,9 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
 
 
 def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
-    """The network duplicates a move, and an old answer to HELLO (query of the name) arrives late.
+    """The network duplicates a move, and an old answer to HELLO (name query) arrives late.
 
-    While a move runs, the server does not answer HELLO. So the late answer seems to show that the
-    server runs no move. The driver stops the second run of the move nevertheless.
+    The answer seems to show that no move runs, but the driver stops the second run.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]
@@ -356,10 +345,10 @@ def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
 def test_a_second_run_whose_first_reply_is_lost_makes_the_odometry_uncertain(
     goal: Pose, cut_s: float
 ) -> None:
-    """A move is duplicated, and its first reply is lost. The covariance fits the error.
+    """A move is duplicated, and its first reply is lost.
 
-    The move runs twice, but the encoder counts only the second run, so the first run is missing in
-    the odometry. The second run ends by itself or is stopped.
+    The encoder counts only the second run, so the odometry lacks the first run, and the covariance
+    fits the error.
     """
     bench = MartBench("source").ready()
     to_board, from_board = bench.robot.receive, bench.robot.advance

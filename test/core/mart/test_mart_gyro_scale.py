@@ -37,8 +37,8 @@ def error_deg(bench: MartBench) -> float:
 def test_a_scale_corrects_all_turns_that_the_gyro_measures(firmware: Firmware) -> None:
     """A gyro measures 95 % of each turn, and the scale is set to 1/0.95.
 
-    The heading is right after a curve of 230°, a turn on the spot of 340° and a goal. The goal
-    requires a turn of 160°. The first turn already has this angle, so no second turn is necessary.
+    The heading is right after a curve, a turn on the spot and a goal, and the goal needs only one
+    turn.
     """
     bench = bench_with_poor_gyro(firmware)
     bench.command(0.2, 0.4, 10.0)
@@ -57,12 +57,9 @@ def test_a_scale_corrects_all_turns_that_the_gyro_measures(firmware: Firmware) -
 
 
 def test_a_gyro_that_measures_half_of_each_turn_makes_no_turn_seem_late() -> None:
-    """The gyro measures half of each turn. After a turn to a goal, the heading is still certain.
+    """The gyro measures half of each turn, so the driver requests half of each angle.
 
-    The server ends a turn by its gyro, so the driver requests half of the true angle. The driver
-    computes the duration of the turn from the true angle. Regression: the driver computed the
-    duration from the requested angle, so each turn to a goal seemed to last long enough for two
-    turns, and the heading was uncertain by more than 2 rad.
+    A turn to a goal does not seem too long, and the heading stays certain.
     """
     bench = bench_with_poor_gyro("firmware", 0.5)
     here = bench.odometry[-1].pose

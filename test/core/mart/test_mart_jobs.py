@@ -21,10 +21,9 @@ def test_the_gyro_is_calibrated_at_rest() -> None:
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
-    """The user requests a gyro calibration, but the IMU is dead. The calibration fails.
+    """The user requests a gyro calibration (SB), but the IMU is dead.
 
-    The driver does not send SB, the command of the calibration. With a dead IMU, the server would
-    not answer SB or any later command.
+    The calibration fails, and the driver does not send SB, which would hang the server.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False

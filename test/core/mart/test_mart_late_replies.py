@@ -62,10 +62,10 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 
 
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
-    """The stop of a turn overtakes an encoder query. The server answers the query after the stop.
+    """An encoder query arrives after the stop of a turn.
 
-    The driver does not use this encoder count as the angle of the turn, and does not learn the
-    motors' speed from it.
+    The driver does not use the count as the angle of the turn, and does not learn the motors' speed
+    from it.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -105,11 +105,10 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 
 
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
-    """The network duplicates the server's replies "not supported". The driver ignores the copies.
+    """The network duplicates the server's replies "not supported".
 
-    A server that follows the manual does not support SSP (speed of turns) and RST IMU (check of the
-    IMU), so the driver checks the IMU by another command. The driver does not take a copy for the
-    reply to this command, and the robot turns.
+    The driver does not take a copy for the result of the next check of the IMU, and the robot
+    turns.
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -144,19 +143,16 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 
 @pytest.mark.parametrize("copied", [False, True])
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
-    """The goal is not discarded although all replies come 0.28 s late.
+    """All replies come 0.28 s late. The driver does not discard the goal.
 
-    After each move, the driver sends a stop, because the network may have delivered the move twice.
-    The server needs 0.3 s to stop a second run, so a reply after 0.28 s shows that there was no
-    second run.
-
-    ``copied``: whether the network does duplicate the move. If it does, the driver reports this,
-    and the odometry contains both runs.
+    ``copied``: whether the network duplicates the move. If so, the driver reports this, and the
+    odometry contains both runs.
     """
     bench = on(NetworkFaults(), "source")
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""
     network = bench.robot.network[0]
     real = network.from_board.send
+    # The server needs 0.3 s to stop a second run, so a reply after 0.28 s shows that there is none.
     network.from_board.send = lambda data, at_s: real(data, at_s + 0.28)
     pilot = bench.board._pilot
     drops(network.to_board, lambda data: data == b"HELLO" and pilot.state is State.MOVING)
@@ -172,11 +168,9 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """A late reply to a start is not taken for the reply to the stop after it.
+    """A copy of an earlier reply looks like the reply to a start, and then a stop is lost.
 
-    The driver checks the IMU, and sends the start. A copy of the reply to the check arrives, and
-    looks like the reply to the start. The driver sends a stop, which is lost. Then the late reply
-    to the start arrives.
+    The start's true reply comes late, and does not prove the stop.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]
@@ -260,11 +254,10 @@ def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
 
 
 def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
-    """Change the network so that it loses some commands and duplicates the next RST IMU.
+    """Let the network lose some commands and duplicate the next RST IMU.
 
-    * ``lost``: the network loses each command that starts with one of these texts.
-
-    The copy of RST IMU is late by 0.29 s, and so is the server's reply to this copy.
+    ``lost``: the beginnings of the lost commands. The copy of RST IMU comes 0.29 s late, and so
+    does the reply to the copy.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []

@@ -65,12 +65,9 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 
 
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
-    """A copy of the reply to MSM is not taken for the reply to RST IMU (check of the IMU).
+    """RST IMU (IMU check) is lost, and a copy of the reply to MSM (end of direct control) arrives.
 
-    The robot is at rest, but the server still reports a motion. The driver sends MSM (end of direct
-    control) and RST IMU. RST IMU is lost, and a copy of the reply to MSM arrives. If the driver
-    took this copy for the reply to RST IMU, it might send the stop SRM, which would hang the
-    server. Instead, the driver tells the user that the server still reports a motion.
+    The driver does not take the copy for a working IMU: the stop SRM would hang the server.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -45,8 +45,8 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """The IMU dies in a motion, the stop port hangs, and later the IMU works again.
 
-    The driver sends no motion until the server is restarted. A gap in the network and a changed
-    heading do not show a restart: a restart would set the heading to zero.
+    The driver sends no motion until the server restarts. A network gap and a changed heading do not
+    show a restart.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -72,8 +72,8 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 ) -> None:
     """The IMU dies in a motion, the stop port hangs, and later the IMU works again.
 
-    The server then answers all waiting requests at once, and the network reorders the replies. The
-    driver recognises that the server is lost, and refuses motion.
+    The network reorders the late replies. The driver knows that the server is lost, and refuses
+    motion.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
     way_m = bench.server.chassis.way_m
@@ -89,11 +89,10 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
     met: bytes, wait_s: float, delay_s: float
 ) -> None:
-    """The driver starts while the robot drives forward (RM) or backward (B) with a dead IMU.
+    """The driver starts while the robot moves with a dead IMU.
 
-    The driver's first stop makes the server hang, and then the stop port hangs, too. The IMU works
-    again ``wait_s`` seconds after the driver's start, and the server answers. The driver refuses
-    motion.
+    The driver's stops make both ports hang. After ``wait_s`` seconds, the IMU works and the server
+    answers, but the driver refuses motion.
     """
     bench = MartBench("source", NetworkFaults(delay_s=delay_s))
     bench.server.receive(met, 0, None, 0.0)
@@ -130,10 +129,10 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 
 @pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
-    """The server's process stands still for 5 s while the robot is at rest, and then works again.
+    """The server's process stands still for 5 s while the robot rests.
 
-    The server answers old queries late. Late replies to queries do not mean that the stop port
-    hangs, so the driver accepts commands again.
+    Afterwards, the driver accepts commands: late replies to queries do not mean that the stop port
+    hangs.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)
@@ -153,8 +152,8 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
 def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
     """Return a test bench whose driver starts while RM turns the robot about its right wheel.
 
-    The network fails for ``away_s`` seconds from the driver's start. The server answers no stop in
-    this time, so the driver uses the stop port before the network works again.
+    The network fails for ``away_s`` seconds from the driver's start, so the driver uses the stop
+    port.
     """
     bench = MartBench(firmware)
     bench.server.receive(b"RM 30", 0, None, 0.0)
@@ -175,8 +174,7 @@ def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
 ) -> None:
     """A robot turns about its resting right wheel, the only wheel with an encoder.
 
-    The server reports a motion in progress, so the left wheel may turn. The driver stops the robot
-    by the commands SL and SS.
+    The driver stops the robot, and a notice says that the right wheel is at rest.
     """
     bench = met_in_a_pivot(firmware, away_s)
     assert abs(bench.robot.board.facts["yaw_rate_radps"]) > 0.5

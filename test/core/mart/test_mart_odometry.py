@@ -33,8 +33,8 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
     """Return a test bench after two motions that end with equal encoder counts.
 
-    The network loses all replies during each motion, and for ``quiet_s`` seconds after the driver
-    begins to stop the robot. After each motion, this function checks the covariance.
+    The network loses all replies in each motion, and ``quiet_s`` seconds longer. This function
+    checks the covariance after each motion.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -290,11 +290,9 @@ def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
 def test_the_covariance_includes_a_change_that_is_carried_out_twice(
     command: tuple[float, float],
 ) -> None:
-    """The robot drives backward, and the server carries out a change of the motors' speeds twice.
+    """In a backward drive, the server carries out a change of the motors' speeds twice.
 
-    The robot turns too far. Nothing measures this turn in a backward drive. The driver learns only
-    from the server's second reply that the command has arrived twice. The covariance covers the
-    turn.
+    The robot turns too far, which nothing measures, and the covariance covers the error.
     """
     bench = MartBench("source").ready()
     inner, first = bench.robot.receive, []
@@ -314,11 +312,9 @@ def test_the_covariance_includes_a_change_that_is_carried_out_twice(
 
 
 def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
-    """After an unknown turn, the robot drives 2 m forward; after another unknown turn, 2 m back.
+    """A robot drives 2 m forward, and 2 m back, each time after an unknown turn.
 
-    The two true directions differ, so x is uncertain by more than 1 m.
-
-    Regression: the errors of both drives cancelled each other, and x was uncertain by a few mm.
+    The errors of the two drives do not cancel each other: x is uncertain by more than 1 m.
     """
     doubt = Doubt(MartSettings())
     for step_m in (0.2, -0.2):

@@ -23,15 +23,14 @@ from omnibot_driver.core.packets import Packets
 pytestmark = pytest.mark.slow
 
 
+# The eight seeds include each fault, and each kind of command as the first one.
 @pytest.mark.parametrize("seed", range(8))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """A single fault in a trial with two requests of the user (``WISHES``) does no harm.
+    """A single fault in a trial with two user commands does no harm.
 
-    * A datagram is lost, late or doubled: the server does not hang, and the robot rests at the end.
-    * The IMU dies: no motion begins more than 0.25 s later. At the end, the robot rests, or the
-      driver has reported that the server is lost.
-
-    The eight seeds include each fault, and each kind of request as the first one.
+    * A datagram is lost, late or doubled: the server does not hang, and the robot rests.
+    * The IMU dies: no motion begins more than 0.25 s later, and the robot rests, or the driver
+      reports a lost server.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))

@@ -107,9 +107,8 @@ def test_the_covariance_includes_the_unknown_turn_if_the_command_ends_in_a_resta
 ) -> None:
     """The server restarts in a curve, and the command ends before the server answers again.
 
-    The covariance covers the error of the heading. A restart sets the server's heading to zero. On
-    some servers, the heading then changes by a little. The driver does not take this change for a
-    turn.
+    The driver does not take a small heading after the restart for a turn, and the covariance covers
+    the error.
     """
     bench = MartBench(firmware).ready()
     bench.command(0.2, 0.3, drive_s)
@@ -124,10 +123,10 @@ def test_the_covariance_includes_the_unknown_turn_if_the_command_ends_in_a_resta
 def test_a_restart_before_the_last_heading_of_a_curve_is_not_taken_for_a_turn(
     boot_s: float, firmware: Firmware
 ) -> None:
-    """The server stops a curve, and restarts before the driver has asked for the last heading.
+    """The server stops a curve, and restarts before the driver reads the last heading.
 
-    The next heading is near zero, because the server has restarted. The driver does not assume that
-    the robot has turned back, and the covariance covers the error of the heading.
+    The driver does not take the new heading near zero for a turn, and the covariance covers the
+    error.
     """
     bench = MartBench(firmware).ready()
     bench.command(0.2, 0.3, 3.0)

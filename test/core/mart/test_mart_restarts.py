@@ -132,11 +132,9 @@ def test_motors_that_run_on_after_a_controlled_move_are_switched_off_before_the_
 
 @pytest.mark.parametrize("offset_s", [0.01 * step for step in range(0, 200, 8)])
 def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_s: float) -> None:
-    """The server restarts within 50 ms in a turn on the spot, and the driver does not notice this.
+    """The server restarts within 50 ms in a turn on the spot, and the driver does not notice.
 
-    VOLTS (voltage query) would crash a server that is starting up, and the motors would stay on.
-    The driver sends no VOLTS in turns on the spot, because it does not need the voltage there. So
-    the server does not crash.
+    The driver sends no VOLTS (voltage query), which would crash a server that is starting up.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.5, 2.0)
@@ -153,11 +151,10 @@ def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_
 def test_a_restart_just_after_a_long_turn_on_the_spot_does_not_crash_the_server(
     boot_s: float,
 ) -> None:
-    """After a turn of 12 s, the server restarts at rest, before the driver asks for the voltage.
+    """The server restarts after a turn of 12 s, when VOLTS (voltage query) is overdue.
 
-    The voltage query (VOLTS) is overdue, because the driver sends no VOLTS in a turn. VOLTS would
-    crash a server that is starting up. But the server has left a request unanswered, so the driver
-    waits before it sends VOLTS.
+    After an unanswered request, the driver delays VOLTS, which would crash a server that is
+    starting up.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.5, 12.0)
@@ -187,8 +184,7 @@ def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
 def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Firmware) -> None:
     """The server restarts in a move, the motors run on, and the IMU is dead.
 
-    The driver switches the motors off by MCS, which needs no IMU. The driver does not use a turn of
-    1 degree (MCR), which would also end with the motors off.
+    The driver switches the motors off by MCS, and not by a turn of 1° (MCR), which needs the IMU.
     """
     bench = rescued(firmware, alive=False)
     assert bench.robot.stands
@@ -225,10 +221,9 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
 def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_queries(
     after_s: float, boot_s: float
 ) -> None:
-    """The driver stops the first turn of a server. The server answers a stop (SM), and restarts.
+    """The server answers the first stop (SM) of a turn, and restarts.
 
-    The driver must send three stop commands. A restart may be the cause, so the driver delays the
-    voltage query (VOLTS), which would crash a server that is starting up.
+    The driver delays VOLTS (voltage query), which would crash a server that is starting up.
     """
     bench = MartBench("source").ready()
     bench.command_until(0.0, 0.5, lambda: not bench.robot.stands, 8.0)
@@ -245,10 +240,10 @@ def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_
 def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
     offset_s: float,
 ) -> None:
-    """Another server answers at the controller's address, until the controller is started there.
+    """Another server answers at the controller's address until the controller starts.
 
-    The address is never silent, so the driver cannot recognise the start by a silence. The driver
-    still gives the controller time to start up: an early command could crash the controller.
+    No silence shows this start, but the driver gives the controller time: an early command could
+    crash the controller.
     """
     bench = MartBench("source").ready()
     seconds = 8.0 + offset_s
@@ -308,11 +303,9 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
-    """A server without the command MCS is restarted in a drive, and the motors run on.
+    """A server without the command MCS restarts in a drive on a bad network, and the motors run on.
 
-    Without MCS (direct control), the driver sends a turn of 1 degree, which ends with the motors
-    off. The network is bad, so the encoder counts that show the motion may come long after the
-    driver's first stops. The robot is at rest within 8.5 s.
+    The driver switches the motors off by a turn of 1°: the robot rests within 8.5 s.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()
@@ -354,10 +347,10 @@ def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarte
 @pytest.mark.parametrize("boot_s", [0.05, 0.4])
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot_s: float) -> None:
-    """A quick restart in B (backward drive) is noticed, and the driver begins the drive anew.
+    """The server restarts quickly in B (backward drive).
 
-    After each second without another speed change, the driver sends ``CS 0 0``, a change by zero.
-    The restarted server refuses it.
+    The driver notices, because the server refuses ``CS 0 0``, a speed change by zero, and begins
+    the drive anew.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 4.0)
@@ -374,10 +367,10 @@ def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot
 def test_a_quick_restart_at_rest_is_noticed_before_the_next_motion(
     boot_s: float, wait_s: float
 ) -> None:
-    """After a restart while the robot rests, the next motion waits until the server is ready.
+    """The server restarts quickly while the robot rests.
 
-    The driver notices even a quick restart, within 0.5 s: after each short silence, it waits for
-    the heading, which is zero after a restart.
+    The driver notices this by the heading, which is zero after a restart, and delays the next
+    motion until the server is ready.
     """
     bench = MartBench("source").ready()
     bench.command(0.2, 0.3, 1.5)

@@ -42,11 +42,10 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """The server never crashes or hangs, and the robot can always be stopped.
+    """The server never crashes or hangs, and the robot can be stopped.
 
-    The search tries all cases in which up to two copies and one reply are late, and the IMU may die
-    at any step. If the IMU is dead, or the driver has given the server up, the search allows
-    everything except a crash of the server.
+    The search covers two late copies, one late reply and a dead IMU. With a dead IMU or a lost
+    server, only a crash is forbidden.
     """
     found = search()
     assert found.bad == ()
@@ -145,9 +144,8 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the state of the server, with fixed values for what the test cannot compare.
 
-    The test cannot tell a command port that waits for the IMU from a command port that hangs. In
-    both cases, the motion is unknown, and so is ``released`` (whether the stop port has stopped a
-    motion).
+    A waiting command port looks like a hung one. In both cases, motion and ``released`` are
+    unknown.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
@@ -158,9 +156,8 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    * Busy server: only the commands of the stop port (SL and SS) are compared.
-    * After the stop port has stopped a motion (``released``): all commands except ``L`` are
-      compared.
+    * Busy server: only SL and SS are compared.
+    * After a stop by the stop port (``released``): ``L`` is not compared.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

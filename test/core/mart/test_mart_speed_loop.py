@@ -38,10 +38,9 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """The driver measures a motor's speed too low at 26 units, and then correctly at 14 units.
+    """The driver measures a motor's speed too low at 26 units, then correctly at 14 units.
 
-    The first measurement has lowered the speed that the driver expects at 14 units. The second
-    measurement, above the expected speed, does not lower the expected speed further.
+    The second measurement does not lower the speed that the driver expects at 14 units.
     """
     line = MotorLine()
     for _ in range(8):
@@ -183,8 +182,8 @@ def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
 ) -> None:
     """On a slow network, the driver changes motor units by at most 15 forward, and 5 backward.
 
-    The network may deliver a change twice, so each change must be small. The limit is lower in a
-    backward drive, where the driver may fail to notice the second change.
+    A change that the network delivers twice must be small, above all backward, where the driver may
+    not notice.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

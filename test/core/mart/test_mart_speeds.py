@@ -110,10 +110,10 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """Something slows a turn of 0.5 rad/s for a while. Afterwards, the turn is not much too fast.
+    """Something slows a turn of 0.5 rad/s for a while.
 
-    ``learned``: whether the driver has learned the motors' speed in an earlier turn. If so, the
-    robot turns at less than 0.6 rad/s, otherwise at less than 0.9 rad/s.
+    Afterwards, the robot turns at less than 0.9 rad/s, or 0.6 rad/s if the driver has ``learned``
+    the motors' speed before.
     """
     bench = MartBench("source").ready()
     if learned:

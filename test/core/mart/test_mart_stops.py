@@ -215,12 +215,9 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 
 @pytest.mark.parametrize("number", range(3))
 def test_a_lost_reply_does_not_make_a_stop_look_like_a_restart(number: int) -> None:
-    """A lost reply to a query does not make the driver suspect a restart of the server.
+    """The network loses replies to queries; later, a drive is stopped as soon as it begins.
 
-    The network loses one to three replies to queries. Later, the user starts a drive, and stops it
-    as soon as the wheels turn. The server answers the start and the first stop with ``ok``, and a
-    second stop with "no motion". The driver concludes that the first stop has ended the drive, and
-    does not switch the motors off by MCS.
+    The driver suspects no restart of the server, and sends no MCS to switch the motors off.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 1.0)
@@ -243,8 +240,7 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
 ) -> None:
     """On a good network, the robot has the speed of the next motion within 1.5 s.
 
-    The driver may send a stop twice. It does not take the reply "no motion" to the second stop for
-    a sign that the server has restarted.
+    The reply "no motion" to a second stop does not make the driver suspect a restart of the server.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)
@@ -282,10 +278,10 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """After the last usual stop (SM or SRM), the driver waits for 0.3 s, then uses the stop port.
+    """The IMU dies in a motion.
 
-    A datagram takes at most 0.3 s, so the usual stop has arrived by then. The server could hang if
-    the driver used the stop port directly after a usual stop.
+    The driver uses the stop port only 0.3 s after the last SM or SRM, when this stop has arrived:
+    an earlier use could hang the server.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)
@@ -346,10 +342,9 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
 
 
 def test_the_replies_to_a_repeated_estop_count_as_unmatched_not_as_late() -> None:
-    """The e-stop is latched, so the driver repeats its stops over a good network.
+    """The e-stop is latched, so the driver repeats its stops on a good network.
 
-    In the figures of the board, only the number of unmatched replies changes, because the replies
-    to the repeated stops match no pending request.
+    In the board's figures, only the number of unmatched replies changes.
     """
     bench = MartBench().ready()
     before = bench.board.figures.own

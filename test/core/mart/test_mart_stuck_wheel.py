@@ -43,10 +43,9 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 
 @pytest.mark.parametrize("first_s", [0.0, 2.0])
 def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
-    """The driver reports a left wheel that is stuck in a turn. The covariance covers the error.
+    """The left wheel is stuck in a turn, and only the right wheel has an encoder.
 
-    Only the right wheel has an encoder. For the same turn of the robot, the right wheel turns twice
-    as far as usual, so the turn that the driver computes from the encoder is wrong.
+    The driver reports the stuck wheel, and the covariance covers the error of the turn.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)

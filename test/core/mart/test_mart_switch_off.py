@@ -67,11 +67,10 @@ def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
 
 
 def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None:
-    """The driver sends MCS (direct control of the motors) to switch them off. The reply is lost.
+    """The reply to MCS, which switches the motors off, is lost.
 
-    The driver repeats MCS, and the server refuses the repeated MCS, because the direct control has
-    already begun. So the driver knows that the first MCS has arrived. The driver then sends MSM,
-    which ends the direct control.
+    The driver repeats MCS, takes the refusal for a confirmation, and sends MSM, which ends the
+    direct control.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
@@ -107,10 +106,9 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 
 
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
-    """The driver sends MSM only when no late copy of MCS can arrive any more.
+    """A copy of a refused MCS (direct control of the motors) arrives 0.29 s late.
 
-    MCS begins the direct control of the motors, and MSM ends the direct control. A copy of MCS
-    after MSM would begin it again.
+    The driver sends MSM, which ends the direct control, only afterwards.
     """
     bench = creeping()
     since = len(bench.written)
@@ -159,10 +157,10 @@ def test_a_motion_that_never_began_does_not_replace_a_switch_off(
 
 
 def test_four_lost_replies_on_a_poor_network_do_not_look_like_a_server_without_mcs() -> None:
-    """The network loses MCS (motor speeds) four times in a row, and some encoder queries.
+    """The network loses MCS (direct control of the motors) four times, and some encoder queries.
 
-    The driver sends MCS once more, and then MSM, which ends the direct control of the motors. It
-    does not report that the server has no MCS.
+    The driver repeats MCS, then ends the direct control, and does not report that the server lacks
+    MCS.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
@@ -282,10 +280,9 @@ def test_a_server_without_these_commands_is_asked_once() -> None:
 
 
 def test_mcs_is_tried_again_after_lost_replies_but_not_after_a_refusal() -> None:
-    """The network loses four replies to MCS (switch off the motors), so the driver gives up.
+    """Four replies to MCS (motors off) are lost, so the driver gives up.
 
-    After a later move, motors may be on again, and the driver tries MCS once more. After the reply
-    "command not supported", it does not.
+    After a later move, the driver tries MCS again, but not after the reply "command not supported".
     """
     switch_off = SwitchOff()
     switch_off.doubt()

@@ -61,10 +61,10 @@ def lose_once(bench: MartBench, begins: bytes) -> None:
 def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -> list[float]:
     """Let the network duplicate the next ``request``, and delay the reply to the duplicate.
 
-    Return a list to which the arrival time of the duplicate is added.
+    The returned list gets the duplicate's arrival time.
 
-    ``after_s``: time in s from the request to its duplicate. ``late_s``: additional delay in s of
-    the file that the server sends in reply to the duplicate.
+    * ``after_s``: time in s from the request to the duplicate.
+    * ``late_s``: additional delay in s of the file that answers the duplicate.
     """
     copied_s: list[float] = []
     there, back = bench.robot.network[0].to_board, bench.robot.network[0].from_board
@@ -178,10 +178,9 @@ def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -
 
 
 def test_the_record_of_an_earlier_turn_is_not_used() -> None:
-    """The driver does not use the record of an earlier turn with the same target angle.
+    """Instead of a turn's record, the server sends that of an earlier turn with the same target.
 
-    The server sends such a record in reply to LAST TURN (download of the record) if it could not
-    record the new turn.
+    The driver does not use this record.
     """
     bench = MartBench("source").ready()
     for yaw_rad in (math.pi / 2, math.pi, -math.pi / 2, 0.0):
@@ -219,10 +218,10 @@ def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes)
 def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
     late_s: float,
 ) -> None:
-    """The driver downloads the record of a turn, and the network duplicates the driver's request.
+    """The network duplicates the driver's download of a turn's record.
 
-    Then the user downloads the record of the last straight move. The driver first waits until no
-    late reply to the duplicate can arrive, so the user gets the right file.
+    Then the user downloads the record of a move. The driver first waits for late replies, so the
+    user gets the right file.
     """
     bench = MartBench("source").ready()
     go(bench, Pose(0.5, 0.0, 0.0))

@@ -28,7 +28,7 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
 """Tuples that say which bit to change, and when.
 
 Each tuple: kind of frame, number of the byte in its payload, number of the bit in this byte, and
-number of ticks that the robot drives before the change.
+number of ticks before the change.
 """
 
 

@@ -106,10 +106,9 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """If the vertical force and the turn rates jump in a single reading, the reading is rejected.
+    """In a single reading, the vertical force and the turn rates jump.
 
-    Bytes of another frame in the reading can cause such jumps. No robot changes its turn rate by
-    this amount for a single reading.
+    The filter rejects the reading, because no robot changes its turn rate so much for one reading.
     """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
@@ -132,10 +131,10 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A knock drives the sensor to its limit, 2 g. The filter releases this reading at once.
+    """A knock drives the sensor to its limit, 2 g.
 
-    A single changed bit cannot turn a reading at rest into 2 g, so the filter does not take the
-    reading for a damaged one.
+    The filter releases the reading at once, because a single changed bit cannot turn a reading at
+    rest into 2 g.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -182,10 +181,10 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement faster than 2 m/s or 8 rad/s is rejected, and counts as lost.
+    """A displacement faster than 2 m/s or 8 rad/s is rejected.
 
-    The rejected displacement reports two losses, and the next displacement reports one. The filter
-    adds the rejected displacement itself, so the next displacement comes out with four losses.
+    The next displacement counts the rejected one as lost, together with the losses that both
+    reported.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -216,10 +215,9 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """After a jump in speed, the filter holds a displacement until the next displacement arrives.
+    """One displacement jumps in speed, and the next one is as fast; a pose comes in between.
 
-    A pose that comes between the two displacements also waits. The second displacement shows that
-    the speed stays high, so the jump may be real, and the filter releases all three readings.
+    The filter holds the first displacement and the pose until the second displacement comes.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
@@ -229,11 +227,9 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 @pytest.mark.parametrize("longer", [1.05, 1.5, 2.0, 3.0])
 def test_a_steady_motion_over_a_longer_time_is_delivered_at_once(longer: float) -> None:
-    """The filter releases a displacement at once even if its duration is three times the usual one.
+    """A robot drives steadily, and one displacement has up to three times the usual duration.
 
-    The robot drives steadily, and one displacement contains the motion of a longer time, for
-    example because a pose was lost before it. Regression: the filter took a displacement with twice
-    the usual duration for a spike, and ``odom`` lost 4 cm.
+    The filter releases this displacement at once, and does not take it for a spike.
     """
     steady = DisplacementReading(0.02, 0.0, 0.04, "body", 0.02, 0)
     both = longer * steady.dx_m, longer * steady.dyaw_rad
@@ -334,10 +330,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """The filter releases the reading of a knock at once if the sensor sends text.
+    """A sensor sends text, so its full scale is infinite.
 
-    Damage to a text does not flip a single bit of a value. So a text sensor has an infinite full
-    scale, and the filter does not suspect a flipped bit.
+    The filter releases the reading of a knock at once: damage to a text does not flip a single bit
+    of a value.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
@@ -376,8 +372,7 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
     """A board corrects its own odometry by a step that no robot can drive.
 
-    A filter for such a board (``corrected=True``) releases the step with ``measured=False`` and
-    ``possible=False``, because the step is a correction and not a motion. The filter rejects a step
+    The filter (``corrected=True``) marks the step as a correction, not a motion, and rejects a step
     with NaN or infinity.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)

@@ -47,10 +47,10 @@ def test_a_pause_loses_nothing() -> None:
 def test_a_restart_after_a_pause_counts_only_if_lost_deltas_do_not_explain_it(
     restarts: bool,
 ) -> None:
-    """The board restarts, or it is paused and started again. The first delta afterwards is lost.
+    """The board restarts, or is paused and started again; the first delta afterwards is lost.
 
-    The driver counts a restart, which causes a warning, only in the first case. In the second case,
-    the lost delta explains the count of the next delta.
+    The driver counts a restart only in the first case: a pause and a lost delta explain the next
+    count.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

@@ -48,11 +48,9 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """The driver stops the robot if displacements are rejected while the motion monitor is on.
+    """While displacements are rejected, the motion monitor is switched off and on again.
 
-    The motion monitor is switched off and on again. After four more displacements have been
-    rejected, the driver stops the robot. Displacements that are rejected while the motion monitor
-    is off do not count.
+    Four rejections after it is on stop the robot. Earlier rejections do not count.
     """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)

@@ -97,10 +97,9 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """A robot is commanded to drive forward, and begins to move backward within a displacement.
+    """A robot drives forward, and begins to move backward within a displacement of 0.1 s.
 
-    In this displacement of 0.1 s, the forward and backward motion can cancel each other, as if the
-    robot were held. Nevertheless, the driver sends Stop within 0.3 s.
+    The sum of the two motions may look like a held robot, but the driver sends Stop within 0.3 s.
     """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
@@ -117,10 +116,9 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """A board's switch is on position control. The driver stops the robot within 0.3 s and 5 cm.
+    """A board's switch is on position control, so the board takes each velocity for a goal.
 
-    The board takes each velocity for a goal. These goals lie behind the robot, so the robot moves
-    in the wrong direction.
+    The robot moves in the wrong direction. The driver stops the robot within 0.3 s and 5 cm.
     """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m
@@ -224,10 +222,9 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
 def test_a_node_that_repeats_such_a_goal_does_not_set_the_robot_in_motion_again(
     jitter_m: float,
 ) -> None:
-    """A node repeats its goal ten times a second, but the robot drives away from the goal.
+    """A robot drives away from a goal, which a node repeats, exactly or nearly, ten times a second.
 
-    The motion monitor trips as early as with a single goal. Then the repetitions are refused. This
-    is also true if the goals differ a little, because the node computes each of them anew.
+    The motion monitor trips, and the driver refuses further repetitions.
     """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.board.grip(0.4, 0.0, 0.0)

@@ -168,8 +168,8 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
     """A single displacement of zero over 0.1 s does not prove that a robot is held.
 
-    The robot may have reversed its direction within this displacement. Two such displacements in a
-    row prove that the robot is held.
+    The robot may have reversed its direction. Two such displacements in a row prove that the robot
+    is held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
@@ -182,10 +182,9 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """A robot uses up its wind-up by moving faster than its set-points allow.
+    """A robot that was held or pushed may catch up a certain distance, the wind-up.
 
-    The wind-up is the extra distance that a robot may drive after it was held or pushed. Each
-    distance beyond the set-points is subtracted from the wind-up, down to zero.
+    Each distance beyond the set-points is subtracted from the wind-up, down to zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

@@ -209,10 +209,10 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """While a commanded robot does not move, the monitor returns the fault ``BLOCKED`` each second.
+    """A commanded robot does not move.
 
-    The caller must filter out the repetitions. If the driver's e-stop was released before, the
-    fault is ``HELD_BY_ESTOP``, because the board's own e-stop may still hold the robot.
+    The monitor returns the fault ``BLOCKED`` each second, or ``HELD_BY_ESTOP`` if the driver's
+    e-stop was released before.
     """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
@@ -260,10 +260,10 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """While a driven robot does not obey Stop, the monitor reports a fault every 5 s.
+    """A driven robot does not obey Stop.
 
-    After each fault, the driver sends Stop again. The time between two faults does not grow,
-    because a later Stop may still reach the board.
+    The monitor reports a fault every 5 s, and the interval does not grow, because a repeated Stop
+    may still reach the board.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)

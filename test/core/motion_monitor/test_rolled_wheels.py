@@ -42,8 +42,8 @@ def test_wheels_from_the_bodys_displacements_and_back(
 ) -> None:
     """``rolled`` is the sum of all displacements of the robot, in the robot's own axes.
 
-    The board may report displacements in the axes of the earth or of the robot. If ``rolled`` is
-    converted to wheel angles and back, its yaw angle stays the same.
+    A conversion of ``rolled`` to wheel angles and back keeps the yaw angle. The board reports in
+    the earth's or the robot's axes.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
@@ -100,8 +100,7 @@ def test_over_a_gap_the_angles_are_those_of_the_encoders(
 ) -> None:
     """After a gap of up to 0.4 s, the wheel angles agree with the encoders within 0.12 rad.
 
-    After a gap of 2 s in curves, the error is up to 5 rad, because the driver assumes the shortest
-    path.
+    After a gap of 2 s, the error is up to 5 rad, because the driver assumes the shortest path.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)

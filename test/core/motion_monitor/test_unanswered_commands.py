@@ -60,8 +60,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
     """A robot ignores a first drive command, obeys a second one, and ignores a third one.
 
-    The line to the board is cut in the first and in the third drive, so the robot does not move.
-    The driver reports this each time.
+    The driver reports both times that the robot does not move.
     """
     bench = standing()
     for hears in (False, True, False):

@@ -82,12 +82,9 @@ def test_the_covariance_is_positive_definite_after_gaps_and_restarts(
 
 
 def test_a_robot_that_turned_unheard_has_an_unknown_heading_and_no_more() -> None:
-    """The robot may have turned by 50 rad in a gap that no pose explains. Then it drives 2 m.
+    """The robot may have turned by 50 rad in a gap, and then drives 2 m.
 
-    The direction of this drive is unknown, but the drive ends within 2 m of its start. So x and y
-    become uncertain by 1 to 5 m, and no more.
-
-    Regression: the position across the drive was uncertain by 100 m.
+    The direction of the drive is unknown, so x and y become uncertain by 1 to 5 m, and no more.
     """
     uncertainty = Uncertainty(OdometryNoise())
     uncertainty.miss(10.0, 0.0, 5.0)

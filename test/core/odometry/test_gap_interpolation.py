@@ -170,9 +170,8 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
 def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_before_it() -> None:
     """After 3 s without data, a board reports that it restarted 0.2 s ago.
 
-    In the 2.8 s before the restart, the robot may have continued to drive at 0.5 m/s and to turn at
-    1 rad/s. The standard deviations of x and yaw are larger than half of this distance and half of
-    this turn.
+    The standard deviations of x and yaw exceed half of the motion that was possible before the
+    restart.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
@@ -186,12 +185,9 @@ def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_
 
 
 def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> None:
-    """A board restarts after 40 s without data, in which the robot may have turned at 1 rad/s.
+    """A board restarts after 40 s without data, in which the robot may have turned.
 
-    Then the robot drives 2 m. Odom shows this drive along x, but its direction is unknown. So the
-    position becomes uncertain by 1 to 5 m in x and in y.
-
-    Regression: y became uncertain by 40 m.
+    A drive of 2 m then makes x and y uncertain by 1 to 5 m, because its direction is unknown.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
@@ -205,12 +201,9 @@ def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> No
 
 
 def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
-    """The board restarts twice, and each time the heading becomes unknown and the robot drives 2 m.
+    """The robot drives 2 m forward, and 2 m back, each time after a restart with an unknown turn.
 
-    Odom shows a drive away from the start and back. The true headings of the two drives may differ,
-    so x is uncertain by more than 1 m.
-
-    Regression: the errors of both drives cancelled each other, and x was uncertain by 0.1 m.
+    The errors of the two drives do not cancel, so x is uncertain by more than 1 m.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
@@ -243,11 +236,10 @@ def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> No
 
 
 def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> None:
-    """The odometry estimates lost motion if poses disprove a suspected restart of the board.
+    """A displacement seems to show a restart.
 
-    A displacement seems to show a restart. Two later displacements are lost, and then two poses
-    disprove the restart. ``use_board_pose`` is False, so the odometry estimates the lost motion
-    from the last motion, not from the poses.
+    Two later displacements are lost, and then two poses disprove the restart. The odometry
+    (``use_board_pose=False``) interpolates the lost motion.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
     attach(odometry, trip.pose)
@@ -268,11 +260,9 @@ def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> 
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(frame: str) -> None:
-    """A pose that disproves a suspected restart also removes the uncertainty of the suspicion.
+    """A displacement makes the odometry suspect a restart, and the next pose disproves the restart.
 
-    A robot whose board restarts comes to rest unseen, so the suspicion adds uncertainty. Here, the
-    next pose still refers to the board's old origin. So the board has not restarted, and the pose
-    shows all of the robot's motion.
+    The covariance is then the same as without the suspicion.
     """
     deviations = []
     for suspected in (False, True):

@@ -109,8 +109,8 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
     """A «Paused» text shows an uninterrupted pause if the frame before it is a «Paused» text, too.
 
-    By the numbers in the texts, at most nine texts may be lost in between. If more texts were lost,
-    or another kind of frame came before the text, the board may have run or restarted.
+    By the numbers in the texts, at most nine texts may be lost in between. Otherwise, the board may
+    have run.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]

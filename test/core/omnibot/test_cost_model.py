@@ -31,10 +31,9 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """A pose has a cost if its heading differs from the expected heading by more than rounding.
+    """A pose has a cost if its heading contradicts the previous pose and the deltas since then.
 
-    The expected heading is that of the previous pose plus the turns of the deltas since then: five
-    deltas, which turn by 5 mrad in all.
+    Five deltas turn by 5 mrad in all; a difference by rounding has no cost.
     """
     context = after_a_cycle([10] * 5, [10, 11, 12, 13, 14])
     cost, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, theta_mrad, 2), context)

@@ -115,10 +115,10 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """A shock makes the IMU readings jump. The decoder still returns each frame.
+    """A shock makes the readings of two IMU frames jump, with a delta in between.
 
-    The shock lasts for two IMU frames, with a delta between them. The adapter delivers the second
-    IMU frame in two parts, and the line is silent after it.
+    The second IMU frame arrives in two parts, before a silence. The decoder returns all three
+    frames.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is

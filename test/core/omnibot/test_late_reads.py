@@ -43,9 +43,8 @@ def stopped(
 ) -> Reads:
     """Yield the reads of a reader that reads ``place`` bytes, pauses for ``stop_s``, and goes on.
 
-    ``most``: largest number of bytes in a read.
-
-    ``piece``: number of bytes for which the reader waits when no unread bytes are left.
+    * ``most``: largest number of bytes in a read.
+    * ``piece``: number of bytes to wait for when no unread bytes are left.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -192,10 +191,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The line is cut in the middle of one frame, and works again in the middle of a later frame.
+    """The line is cut in one frame, and works again in a later frame.
 
-    Together, the two parts that arrive have the length of one frame. The decoder rejects them,
-    because there is a pause between them.
+    The two parts together have the length of a frame, but the decoder rejects them because of the
+    pause in between.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):

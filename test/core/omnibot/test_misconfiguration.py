@@ -125,10 +125,9 @@ def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("reads_s", [0.016, 0.1, 0.5, 1.0])
 def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
-    """A busy computer reads up to one second of data at once.
+    """A busy computer reads up to 1 s of data at once, so many deltas have the same arrival time.
 
-    All deltas of one read have the same arrival time. Nevertheless, the driver does not advise the
-    user to change the setting of the delta period.
+    The driver does not advise the user to change the delta period.
     """
     sent = sent_by(BoardSettings(running=True, delta_period_s=0.04), LONG_S)
     driver = OmniBot(OmniBotSettings())

@@ -79,7 +79,7 @@ def test_words_that_would_act_take_the_nearest_value_that_does_not(
     """Instead of a 16-bit word with harmful bytes, the driver sends the nearest harmless word.
 
     Harmful bytes are a letter (S, P, R) or a header: a board that misses the frame's header would
-    obey such bytes. The expected bytes are typed by hand.
+    obey them.
     """
     assert payload(*harmless(counts)) == bytes.fromhex(typed)
 
@@ -103,10 +103,9 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """A goal is rejected if the high byte of its x is a letter (S, P or R).
+    """The high byte of a goal's x is S, P or R, which could start, pause or reset the board.
 
-    Such a letter could start, pause or reset the board. The driver does not send the nearest
-    harmless goal instead, because that goal could be 0.26 m away.
+    The driver rejects the goal: the nearest harmless goal could be 0.26 m away.
     """
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset if the line"):

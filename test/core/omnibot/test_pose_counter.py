@@ -63,18 +63,15 @@ def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> 
     assert sequence.pose((60 + poses) % 256, count * 0.04) == Step(0)
 
 
+# 1228: both counters also fit a loss of frames. 1150: both counters show the restart. 972: only the
+# counter of the poses shows the restart.
 @pytest.mark.parametrize(("uptime", "ambiguous"), [(1228, True), (1150, False), (972, False)])
 def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restart(
     uptime: int, ambiguous: bool
 ) -> None:
-    """A pose after a gap is ambiguous if the counters fit both a restart and a loss of frames.
+    """After ``uptime`` deltas and 2.1 s of silence, the board restarts and counts from zero.
 
-    The board sends ``uptime`` deltas, is silent for 2.1 s, restarts, and counts from zero again.
-
-    * ``uptime`` is 1228: by chance, the counters of deltas and poses also fit a mere loss of
-      frames. The pose is ambiguous.
-    * ``uptime`` is 1150: both counters show the restart. The pose is not ambiguous.
-    * ``uptime`` is 972: only the counter of the poses shows the restart. The pose is not ambiguous.
+    The pose is ambiguous only if both counters (deltas and poses) also fit a loss of frames.
     """
     sequence = counted(uptime)
     begun_s = uptime * 0.04 + 2.1
@@ -90,12 +87,10 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
     interrupt: Callable[[Sequence], None],
 ) -> None:
-    """A pose after a gap is ambiguous even if a pause or a reconnection precedes the pose.
+    """After a gap, the counters fit a restart and also a loss of frames.
 
-    After a gap of 2.1 s, the counters fit a restart of the board, but also a loss of frames. Before
-    the next pose, the board is paused, or the port is opened again. If the board has restarted, the
-    pose refers to a new origin. If the driver then supposed the old origin, ``odom`` would jump to
-    the place where the board first started.
+    Then the board is paused, or the port is reopened. The next pose is still ambiguous, because it
+    may refer to a new origin.
     """
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1
@@ -107,19 +102,17 @@ def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
     assert sequence.ambiguous
 
 
+# 217: the pose counter shows the restart. 1241: the pose counter also seems to have continued.
 @pytest.mark.parametrize(("uptime", "restarted"), [(217, True), (1241, False)])
 def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
     uptime: int, restarted: bool
 ) -> None:
     """The board restarts in a gap, and by chance the delta counter seems to have continued.
 
-    ``uptime``: number of deltas before the gap. In the gap of 12.4 s, the board restarts and sends
-    270 deltas. The result depends on ``uptime``:
-
-    * 217: the pose counter does not seem to have continued, so the next pose shows the restart.
-    * 1241: the pose counter also seems to have continued, so the next pose is ambiguous.
+    The next pose shows the restart, or is ambiguous if its counter also seems to have continued.
     """
     sequence = counted(uptime)
+    # The gap lasts 12.4 s. In the gap, the board restarts and sends 270 deltas.
     for count in range(270, 275):
         step = sequence.delta(count % 256, (uptime + 39 + count) * 0.04)
         assert not step.restarted
@@ -127,17 +120,17 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
     assert sequence.ambiguous != restarted
 
 
+# After 7 s, the driver also supposes a wrap of the delta counter: 7 s is nearer to a wrap, 10.24 s,
+# than to 0.
 @pytest.mark.parametrize("silent_s", [4.0, 7.0])
 @pytest.mark.parametrize("restarted", [True, False])
 def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
     restarted: bool, silent_s: float
 ) -> None:
-    """A delta that continues the count after a silence still makes the driver suspect a restart.
+    """A delta continues the count after a silence.
 
-    A restarted board may have the same count by chance, so the driver marks the restart as
-    doubtful. The counter of the next pose shows whether the board has restarted. After a silence of
-    7 s, the driver also supposes that the delta counter has wrapped, because 7 s is nearer to a
-    wrap, 10.24 s, than to 0.
+    The driver suspects a restart, but marks it as doubtful: a restarted board may have this count
+    by chance. The next pose's counter decides.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + silent_s
@@ -148,16 +141,15 @@ def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
     assert pose.restarted == restarted
 
 
+# 51: the pose counter continues its old count, so the counter of the delta may be damaged.
+# 30: the pose counter is not near 0, and does not continue its old count.
 @pytest.mark.parametrize(("number", "restarted"), [(2, True), (51, False), (30, False)])
 def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_begins_anew(
     number: int, restarted: bool
 ) -> None:
-    """A delta seems to show a restart. A pose confirms the restart if the pose counter is near 0.
+    """A delta seems to show a restart.
 
-    In two other cases, the pose does not confirm the restart:
-
-    * The pose counter continues its old count, so the counter of the delta may be damaged.
-    * The pose counter is not near 0, and does not continue its old count.
+    The next pose confirms the restart only if the pose counter is near 0.
     """
     sequence = counted(200)
     after_s = 199 * 0.04 + 2.1
@@ -195,10 +187,10 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """The board restarts. Its first delta has the counter 0, which could also be a damaged counter.
+    """After a restart, a delta and a pose have the counter 0.
 
-    The pose after this delta also has the counter 0, so the pose shows the restart. The next delta
-    has the counter 1, and the driver counts no delta as lost.
+    The delta's counter could be damaged, but the pose shows the restart. The driver counts no delta
+    as lost.
     """
     sequence = Sequence()
     for count in range(171):
@@ -218,10 +210,9 @@ def reopened() -> Sequence:
 
 
 def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
-    """The pose counter also shows a restart that happened while the port was closed.
+    """The board restarts while the port is closed.
 
-    The counter of the deltas does not show it: by chance, its value after the restart is the one
-    that a board without a restart would have sent.
+    By chance, the delta counter seems to have continued, but the pose counter shows the restart.
     """
     sequence = reopened()
     after_s = 205 * 0.04 + 2.0
@@ -271,10 +262,9 @@ def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> No
 def test_a_pose_that_comes_first_after_a_reconnection_is_not_counted_against_earlier_losses() -> (
     None
 ):
-    """A reconnection whose first frame is a pose does not make the driver suspect a restart.
+    """Deltas are lost, and then the first frame after a reconnection is a pose.
 
-    Deltas were lost before this pose, so the pose counter does not fit the received deltas. The
-    driver ignores this pose counter, because the next delta shows the losses.
+    The pose's counter does not fit the received deltas, but the driver does not suspect a restart.
     """
     sequence, restarts = Sequence(), []
     for count in [*range(25), *range(49, 75)]:
@@ -310,11 +300,10 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """A pose shows that a delta is lost. The next delta does not count this loss again.
+    """A pose shows that a delta is lost.
 
-    This delta arrives only 20 ms after the pose, although its counter has advanced by two periods
-    (80 ms). The pose has explained the counter, so the driver does not take the counter for a
-    damaged one.
+    The next delta, 20 ms later, does not count this loss again. Its counter, two periods ahead,
+    does not seem damaged.
     """
     sequence = Sequence()
     for count in range(11):

@@ -34,20 +34,19 @@ def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
 
 @given(counts, st.floats(0.0, 5.0))
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
-    """The host hangs for up to 5 s, so the next delta arrives late. Its SEQ continues the count.
+    """A delta that continues the count comes up to 5 s late, and the board sends no poses.
 
-    The driver counts no delta as lost, and does not assume a restart. The board sends no poses, so
-    nothing could disprove a restart that the driver had assumed wrongly.
+    The driver counts no delta as lost, and does not assume a restart, which no pose could disprove.
     """
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The first delta after a pause continues the count. The driver counts no delta as lost.
+    """The first delta after a pause continues the count.
 
-    The duration of this delta is unknown. If its count is 0, the driver assumes a restart, because
-    a restarted board begins at 0.
+    The driver counts no delta as lost. The duration of this delta is unknown, and the driver
+    assumes a restart only if its count is 0.
     """
     sequence = begun(count)
     sequence.pause()
@@ -59,10 +58,9 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """After a pause, the driver suspects a restart if the first delta does not continue the count.
+    """The first delta after a pause has the count 0, or does not continue the count.
 
-    If the count of the first delta is 0, the driver suspects a restart in any case. The board sends
-    poses, and the next pose shows whether the board has restarted.
+    The driver suspects a restart, because the board sends poses, and the next pose decides.
     """
     sequence = Sequence()
     for number in range(11):
@@ -81,10 +79,10 @@ def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_boa
 def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """If a board sends no poses, only a low count after a pause makes the driver suspect a restart.
+    """A board without poses is paused.
 
-    A count is low if a restart would mean no more lost deltas than a continued count. Without
-    poses, nothing can disprove the suspicion later.
+    The driver suspects a restart only if the next delta's count is low: a restart would mean no
+    more lost deltas than a continued count.
     """
     sequence = begun(count)
     sequence.pause()
