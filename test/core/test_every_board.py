@@ -219,7 +219,8 @@ def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_agai
 ) -> None:
     """In a drive, the line is cut in both directions.
 
-    After 4 s, only the board receives again. The driver still repeats Stop, so the robot stops.
+    After 4 s, the board receives again, but the driver does not. The driver still repeats Stop, so
+    the robot stops.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False

@@ -91,7 +91,7 @@ def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame:
     """A paused board restarts at rest, and the driver misses its frames for 4 s.
 
     So the first count is larger than the last count before the restart. Odom does not move to the
-    board's new origin.
+    new origin.
     """
     on = line(0, frame=frame)
     on.drives = False

@@ -211,7 +211,7 @@ def _asked(world: World) -> Step:
     """Return the model's step in which the driver finds out which motion is in progress.
 
     The driver does this after it has used the stop port. A lost reply changes no state, so the
-    model omits it.
+    model omits this case.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -280,8 +280,8 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply.
 
-    ``late``: whether the reply may belong to an earlier command. Such a reply never answers a
-    check, a controlled move or MSM (end of direct control).
+    ``late``: whether the reply may belong to an earlier command. For a check, a controlled move and
+    MSM (end of direct control), the driver ignores such a reply.
     """
     driver = world.driver
     state = driver.state

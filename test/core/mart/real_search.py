@@ -3,8 +3,8 @@
 """A bounded search that runs the real driver against the simulated firmware, in many trials.
 
 In most trials, a user gives commands (*wishes*), and one datagram has a *fate*: it is lost, late or
-doubled, or the IMU dies when it is sent. In the others, a driver starts while the server may be
-executing a command.
+doubled, or the IMU dies when the datagram is sent. In the others, a driver starts while the server
+may be executing a command.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets of trials.
 """
@@ -186,8 +186,8 @@ def eights() -> Iterator[Trial]:
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials of one sequence of user commands, each with one disturbed datagram.
 
-    In each direction, only the first datagrams are disturbed: ``MOST_DATAGRAMS`` for each command.
-    Each of them meets every fate in ``FATES``.
+    In each direction, only the first datagrams are disturbed: at most ``MOST_DATAGRAMS`` for each
+    command. Each of them meets every fate in ``FATES``.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

@@ -133,8 +133,8 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
     """A sonar query gets no reply.
 
-    The next sonar query waits, because the reply may still come. ENC (encoder query) is sent at
-    once, and its reply is doubtful.
+    The next sonar query waits for this reply. ENC (encoder query) is sent at once, and its reply is
+    doubtful, because a late sonar reply would look the same.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)

@@ -137,7 +137,7 @@ def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
 def test_opposite_angles_of_gyro_and_wheel_are_told_by_the_parameters_that_invert_them(
     encoder_sign: int, settings: MartSettings
 ) -> None:
-    """The encoder or the heading has a wrong sign, so both show opposite angles of a turn.
+    """The encoder or the heading has a wrong sign, so the two show opposite angles of a turn.
 
     The driver's notice names ``heading_inverted`` and ``encoder_inverted``, not a stuck wheel.
     """

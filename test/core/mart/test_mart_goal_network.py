@@ -241,7 +241,7 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
     """The robot turns, then drives straight, and the driver reads the heading only after the drive.
 
-    The odometry does not add the turn, computed from the encoder, a second time.
+    The odometry has added the turn by the encoder count, and does not add the turn again.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))

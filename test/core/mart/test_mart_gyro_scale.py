@@ -59,7 +59,7 @@ def test_a_scale_corrects_all_turns_that_the_gyro_measures(firmware: Firmware) -
 def test_a_gyro_that_measures_half_of_each_turn_makes_no_turn_seem_late() -> None:
     """The gyro measures half of each turn, so the driver requests half of each angle.
 
-    A turn to a goal does not seem too long, and the heading stays certain.
+    A turn to a goal does not seem to last too long, and the heading stays certain.
     """
     bench = bench_with_poor_gyro("firmware", 0.5)
     here = bench.odometry[-1].pose

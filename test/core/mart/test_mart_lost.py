@@ -91,8 +91,8 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
 ) -> None:
     """The driver starts while the robot moves with a dead IMU.
 
-    The driver's stops make both ports hang. After ``wait_s`` seconds, the IMU works and the server
-    answers, but the driver refuses motion.
+    The driver's stops make both ports hang. After ``wait_s`` seconds, the IMU works again, and the
+    server answers. The driver refuses motion.
     """
     bench = MartBench("source", NetworkFaults(delay_s=delay_s))
     bench.server.receive(met, 0, None, 0.0)
@@ -174,7 +174,8 @@ def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
 ) -> None:
     """A robot turns about its resting right wheel, the only wheel with an encoder.
 
-    The driver stops the robot, and a notice says that the right wheel is at rest.
+    The left wheel may turn, so the driver stops the robot. A notice says that the right wheel is at
+    rest.
     """
     bench = met_in_a_pivot(firmware, away_s)
     assert abs(bench.robot.board.facts["yaw_rate_radps"]) > 0.5

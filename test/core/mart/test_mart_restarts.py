@@ -242,8 +242,8 @@ def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
 ) -> None:
     """Another server answers at the controller's address until the controller starts.
 
-    No silence shows this start, but the driver gives the controller time: an early command could
-    crash the controller.
+    No silence shows this start, but the driver gives the controller time to start: an early command
+    could crash the controller.
     """
     bench = MartBench("source").ready()
     seconds = 8.0 + offset_s
@@ -349,8 +349,8 @@ def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarte
 def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot_s: float) -> None:
     """The server restarts quickly in B (backward drive).
 
-    The driver notices, because the server refuses ``CS 0 0``, a speed change by zero, and begins
-    the drive anew.
+    The server refuses ``CS 0 0``, a speed change by zero. So the driver notices the restart, and
+    begins the drive anew.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 4.0)

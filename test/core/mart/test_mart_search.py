@@ -44,8 +44,8 @@ KINDS: Final = {
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
     """The server never crashes or hangs, and the robot can be stopped.
 
-    The search covers two late copies, one late reply and a dead IMU. With a dead IMU or a lost
-    server, only a crash is forbidden.
+    Up to two copies and one reply come late, and the IMU may die. With a dead IMU or a lost server,
+    only a crash is forbidden.
     """
     found = search()
     assert found.bad == ()

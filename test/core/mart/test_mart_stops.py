@@ -280,8 +280,8 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 ) -> None:
     """The IMU dies in a motion.
 
-    The driver uses the stop port only 0.3 s after the last SM or SRM, when this stop has arrived:
-    an earlier use could hang the server.
+    The driver waits for 0.3 s after the last SM or SRM (stops), and then uses the stop port: an
+    earlier use could hang the server.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)

@@ -108,7 +108,8 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
     """In a single reading, the vertical force and the turn rates jump.
 
-    The filter rejects the reading, because no robot changes its turn rate so much for one reading.
+    The filter rejects the reading, because no robot changes its turn rate by this amount for one
+    reading.
     """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
@@ -215,7 +216,7 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """One displacement jumps in speed, and the next one is as fast; a pose comes in between.
+    """One displacement jumps in speed, and the next one is fast, too; a pose comes in between.
 
     The filter holds the first displacement and the pose until the second displacement comes.
     """

@@ -50,7 +50,7 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
     """While displacements are rejected, the motion monitor is switched off and on again.
 
-    Four rejections after it is on stop the robot. Earlier rejections do not count.
+    Four rejections with the motion monitor on stop the robot. Earlier rejections do not count.
     """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)

@@ -168,8 +168,8 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
     """A single displacement of zero over 0.1 s does not prove that a robot is held.
 
-    The robot may have reversed its direction. Two such displacements in a row prove that the robot
-    is held.
+    The robot may have reversed its direction in this time. Two such displacements in a row prove
+    that the robot is held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)

@@ -60,7 +60,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
     """A robot ignores a first drive command, obeys a second one, and ignores a third one.
 
-    The driver reports both times that the robot does not move.
+    The driver reports for the first and the third command that the robot does not move.
     """
     bench = standing()
     for hears in (False, True, False):

@@ -35,7 +35,8 @@ def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
     * Pose: no coordinate is above 1e7, in mm or mrad.
-    * IMU frame: below 0.5 g, no word of the acceleration is -6, which has the bytes of a header.
+    * IMU frame: if the acceleration is below 0.5 g, none of its words is -6, which has the bytes of
+      a header.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7

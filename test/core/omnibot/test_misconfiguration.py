@@ -125,7 +125,7 @@ def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("reads_s", [0.016, 0.1, 0.5, 1.0])
 def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
-    """A busy computer reads up to 1 s of data at once, so many deltas have the same arrival time.
+    """A busy computer reads up to 1 s of data at once, and a read's deltas get one arrival time.
 
     The driver does not advise the user to change the delta period.
     """

@@ -130,7 +130,7 @@ def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
     """A delta continues the count after a silence.
 
     The driver suspects a restart, but marks it as doubtful: a restarted board may have this count
-    by chance. The next pose's counter decides.
+    by chance. The counter of the next pose decides.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + silent_s

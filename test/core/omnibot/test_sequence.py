@@ -45,8 +45,8 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
     """The first delta after a pause continues the count.
 
-    The driver counts no delta as lost. The duration of this delta is unknown, and the driver
-    assumes a restart only if its count is 0.
+    The driver counts no delta as lost, does not know the duration of this delta, and assumes a
+    restart only if the count is 0.
     """
     sequence = begun(count)
     sequence.pause()
