@@ -37,14 +37,13 @@ sys.exit(pytest.main(sys.argv[1:]))
 def test_without_the_files_of_one_board_the_rest_still_works(board: str, tmp_path: Path) -> None:
     """Without the files of one board, all other modules can be imported, and selected tests pass.
 
-    Without the default board, a test of the complete driver passes, too. The tests run in a copy of
-    the package without the board's files. The copy keeps the folders ``__pycache__``, to save time.
-    Python ignores a file in them if its source is missing.
+    Without the default board, a test of the complete driver passes, too.
     """
     default, *others = boards.PROFILES
     remaining = others[0] if board == default else default
     tests = [f"{MOVES}[{remaining}]", SIMULATED, *([DRIVER] if board == default else [])]
     ignored = shutil.ignore_patterns(board, f"{board}.py", f"{board}_*.py")
+    # Copying __pycache__ saves time. Python ignores a file in it if the source is missing.
     for folder in ("omnibot_driver", "test"):
         shutil.copytree(HOME / folder, tmp_path / folder, ignore=ignored)
     shutil.copy(HOME / "pyproject.toml", tmp_path)

@@ -72,8 +72,7 @@ def test_a_driver_that_shuts_down_refuses_all_services_of_the_board(board: str) 
 def test_a_replay_refuses_the_services_whose_effect_no_data_shows(board: str, data: bool) -> None:
     """In a replay, the services that command the board fail: a replay writes nothing to a board.
 
-    The test leaves out the services ``~/record_…`` of the LOIS ECU: in a replay, these services
-    wait until the replay comes to a record that the board sent.
+    The test leaves out the ``~/record_…`` services, which wait for a record in the replay.
     """
     bench = nominal(board)
     services = Services(board, bench)

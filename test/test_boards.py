@@ -152,8 +152,7 @@ OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
     """The parameter descriptions say about an IMU only what is true for the board.
 
-    * If the board subtracts its gyro bias itself, the description of ``gyro_bias`` does not say
-      that ``~/calibrate_gyro`` measures the bias.
+    * ``gyro_bias`` says that ``~/calibrate_gyro`` measures the bias, unless the board subtracts it.
     * Only the OmniBot's parameters quote the noise of an IMU.
     """
     profile = boards.load(name)

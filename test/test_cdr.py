@@ -64,8 +64,8 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 def padded(data: bytes, like: bytes) -> bytes:
     """Return ``data`` with its padding bytes replaced by those of ``like``.
 
-    rclpy does not set the padding to zero: the bytes between the NUL at the end of a string and the
-    next multiple of eight can have any value.
+    rclpy leaves arbitrary values in the bytes between the NUL of a string and the next multiple of
+    eight.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):

@@ -10,10 +10,9 @@ from omnibot_driver import driver
 def test_without_a_thread_for_its_deadline_a_shutdown_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The thread of the deadline cannot be started. The shutdown continues without a deadline.
+    """The thread of the deadline cannot be started, and the shutdown continues without a deadline.
 
-    If the shutdown failed instead, the driver would send no stop, and only the guard would stop the
-    robot. A thread cannot be started when the computer is at its limit of processes.
+    If the shutdown failed instead, only the guard would stop the robot.
     """
 
     def refuse(_timer: object) -> None:

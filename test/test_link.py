@@ -73,8 +73,8 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 ) -> None:
     """The guard process gets at most ten heartbeats a second, even if the pacer runs more often.
 
-    The driver replaces a guard that leaves many heartbeats unread. If the driver sent heartbeats
-    more often, it would also replace a guard that is only slow.
+    With more heartbeats, a slow guard would leave too many unread, and the driver would replace the
+    guard.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -151,8 +151,8 @@ def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proof
 ) -> None:
     """The longest possible shutdown of a link takes less time than ``LONGEST_END_S``.
 
-    After this time, the driver ends its process by force. The shutdown includes the longest waits
-    for two proofs of a standstill, and the time for the guard's last words.
+    After this time, the driver ends its process by force. The shutdown includes two proofs of a
+    standstill, and the guard's last words.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S

@@ -147,10 +147,10 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 
 
 def test_an_unknown_heading_is_published_with_the_variance_of_an_unknown_direction() -> None:
-    """An estimate has a yaw variance of 66 rad², which is too large for the error of a direction.
+    """The yaw variance of an estimate is 66 rad², too large for the error of a direction.
 
-    The message ``odom`` has π²/3 rad², the variance of an unknown direction. The variances of the
-    position stay the same, and the matrix is positive definite.
+    The message ``odom`` has π²/3 rad² instead, and the same variances of the position. The matrix
+    is positive definite.
     """
     estimate = OdometryEstimate(
         0.0,

@@ -228,10 +228,10 @@ def test_the_bag_of_a_killed_recorder_is_read_as_far_as_it_is_whole(
 
 
 def test_a_bag_that_breaks_off_before_its_first_message_says_so(tmp_path: Path) -> None:
-    """The bag of a killed recorder has no complete message. The error calls the bag incomplete.
+    """The bag of a killed recorder has no complete message.
 
-    The error also says that the topic raw_rx is missing, and advises the user to record it. A user
-    who has recorded raw_rx learns from the word "incomplete" why the topic is missing.
+    The error says that the topic raw_rx is missing, and that the bag is incomplete, which is the
+    cause.
     """
     file = bag(tmp_path / "bag", RX) / "bag.mcap"
     file.write_bytes(file.read_bytes()[:60])

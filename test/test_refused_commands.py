@@ -63,10 +63,10 @@ class Sender:
 def test_a_sender_of_refused_commands_does_not_pause(
     refused: Action, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The motion monitor has stopped the robot. Motion is refused until the sender is silent.
+    """After a stop by the motion monitor, a sender sends commands that are refused or rejected.
 
-    The sender goes on sending commands that the driver refuses or rejects, so the sender is not
-    silent. The driver also refuses the next valid command of this sender.
+    The driver also refuses the next valid command of this sender, because the sender was not
+    silent.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -80,10 +80,9 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor has stopped the robot. Motion is refused until the sender is silent.
+    """After a stop by the motion monitor, a sender's commands arrive late because of a stall.
 
-    Then the computer stalls. The driver refuses the commands that arrive late, but they show that
-    the sender is not silent. So the driver also refuses the sender's next command after the stall.
+    The driver refuses the late commands and the next command, because the sender was not silent.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -101,10 +100,9 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor stops the robot. The sender pauses, so motion is no longer refused.
+    """After a stop by the motion monitor, the sender has paused, so motion is no longer refused.
 
-    A command then arrives too late, and is refused. The next command is accepted, because the late
-    command does not renew the refusal of motion.
+    A command arrives too late and is refused, but the next command is accepted.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -282,11 +282,10 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """While the offset of a sender's clock is unknown, the driver returns two sending times.
+    """The offset of a sender's clock is unknown, and the sender's first message took 0.5 s.
 
-    * By the driver's clock: 0.5 s too late. The driver assumes that the sender's first message
-      had no delay, but it took 0.5 s.
-    * By the sender's clock: right, because the sender's clock is right in this test.
+    For the second message, the driver returns two sending times: by the driver's clock, 0.5 s too
+    late; by the sender's clock, right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)

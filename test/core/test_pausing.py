@@ -21,10 +21,9 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """The user requests a pause. The driver sends Stop, waits for new data, and sends P once.
+    """The user requests a pause while the robot drives.
 
-    P would resume a paused board, so the new data must show first that the board runs. The board's
-    «Paused» text confirms the pause.
+    The driver sends Stop, then P once. The board's «Paused» text confirms the pause.
     """
     bench.drive(0.5)
     bench.run(0.3)
@@ -82,11 +81,10 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board. The user requests a pause before the «Paused» text arrives.
+    """Another program pauses the board just before the user requests a pause.
 
-    The driver does not know that the board is paused. It sends P, which resumes the board. Only
-    now, the «Paused» text of the first pause arrives. It does not confirm the user's pause. So the
-    driver sends P again.
+    The driver's P resumes the board. The late «Paused» text of the first pause does not confirm the
+    request, so the driver sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")

@@ -99,10 +99,9 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """During a request, ``wake_at`` is later than now, so no thread wakes up without need.
+    """During a request, ``wake_at`` is always later than now, so no thread wakes up without need.
 
-    ``wake_at`` is the time by which the session must act again. The test runs with a board that
-    sends data, and with a silent one.
+    The test runs with a board that sends data, and with a silent one.
     """
     bench = Bench()
     bench.speaks = speaks
@@ -168,10 +167,9 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("runs", [True, False])
 def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
-    """The driver sends only one R to a board that needs less than 0.1 s to boot.
+    """The user resets a board that boots within 0.1 s.
 
-    The board may have sent the first «Paused» text before or after R. The number in the second text
-    shows the restart.
+    The driver sends only one R, because the number in the second «Paused» text shows the restart.
     """
     bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
     bench.open()
@@ -200,10 +198,9 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 @pytest.mark.parametrize("connected_s", [0.1, 0.25])
 def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: float) -> None:
-    """The first «Paused» text of a connection does not show that the board has restarted.
+    """A board sends the first «Paused» text of a connection after the driver's R (reboot) was lost.
 
-    The text has a number, but the driver knows no earlier number to compare it with. In this test,
-    R (reboot) is lost. So the driver reports that the reset has failed.
+    Without an earlier number to compare, the text does not show a restart, so the reset fails.
     """
     bench = Bench(run=False)
     bench.open()
@@ -216,10 +213,9 @@ def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: flo
 
 
 def test_lost_texts_do_not_make_a_paused_board_seem_to_have_restarted() -> None:
-    """The user requests a reset, but the paused board receives nothing, so the reset fails.
+    """A paused board does not receive the user's reset, and three of its «Paused» texts are lost.
 
-    Three «Paused» texts of the board are lost. The number in the next «Paused» text is too high for
-    a restarted board, so the driver sees that the board has not obeyed.
+    The reset fails: the number in the next text is too high for a restarted board.
     """
     bench = Bench(run=False)
     bench.open()

@@ -39,10 +39,10 @@ def driven(deltas: int, step_m: float) -> tuple[Odometry, list[OdometryEstimate]
 
 @pytest.mark.parametrize("lost", [20, 25])
 def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
-    """The board restarts in a gap, and only the next pose shows the restart. Odom does not jump.
+    """The board restarts in a gap, and only the next pose shows the restart.
 
-    By chance, the count of the first delta after the gap does not show the restart. The gap is so
-    long that the robot could also have driven to the board's old origin.
+    Odom does not jump, although the robot could also have driven to the board's old origin in the
+    gap.
     """
     odometry, estimates = driven(75, 0.004)
     before = last(estimates)
@@ -78,11 +78,10 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     ambiguous: bool, told_m: float, x_m: float
 ) -> None:
-    """After a gap, a board's pose at the origin shows a restart of the board. Odom does not move.
+    """After a gap, a board's pose at the origin shows a restart if the counters allow one.
 
-    The counters of the board fit both a restart and a loss of frames (``ambiguous``). If the
-    counters exclude a restart, or if the board's pose lies 1 cm beside the origin, odom moves to
-    the board's pose.
+    Odom then does not move. If the counters exclude one, or if the pose is 1 cm off, odom moves to
+    the pose.
     """
     odometry, estimates = driven(75, 0.004)
     for number in range(127, 177):
@@ -95,10 +94,9 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
 
 
 def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
-    """A single lost displacement before a gap does not hide a restart in the gap.
+    """One displacement is lost before a longer gap in which the board restarts.
 
-    A pose at the new origin shows the restart. The odometry looks for a restart in the longest gap
-    since the last pose, not in the first gap (the single loss).
+    The pose at the new origin shows the restart, so odom does not jump.
     """
     odometry, estimates = driven(75, 0.016)
     estimates += odometry.displace(replace(earth(0.016, 0.0), lost=1), 76 * PERIOD_S)
@@ -115,13 +113,8 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_shor
 ) -> None:
     """The robot drives 1.2 m. After a gap of 0.6 s, the board's pose is at the origin.
 
-    * ``ambiguous`` is True: the counters allow a restart, so the pose shows a restart. Odom adds
-      only the assumed motion in the gap.
-    * ``ambiguous`` is False: the counters exclude a restart, so the robot has driven back. Odom
-      moves to the origin.
-
-    Regression: after a restart, odom moved back to the start of the drive if the robot could have
-    driven there.
+    If the counters allow a restart (``ambiguous``), odom stays near 1.2 m. If not, odom moves to
+    the origin.
     """
     odometry, estimates = driven(75, 0.016)
     for number in range(90, 140):
@@ -166,10 +159,7 @@ def test_a_disproved_restart_leaves_no_more_uncertainty_than_the_motion_that_was
 ) -> None:
     """A delta seems to show a restart, but the next poses show that the board has not restarted.
 
-    The robot has moved by ``lost_m`` unnoticed. ``use_board_pose`` is False, so the poses do not
-    correct odom. The covariance covers an error of ``lost_m`` in any direction, and no more.
-
-    Regression: after a wrong suspicion of a restart, the yaw stayed uncertain by 0.3 rad.
+    The covariance covers the unnoticed motion ``lost_m`` in any direction, and no error of the yaw.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip(0.7)
     attach(odometry, trip.pose)
@@ -243,10 +233,9 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 def test_a_reset_after_a_gap_leaves_no_wrong_heading(
     lost: int, use_board_pose: bool, frame: str
 ) -> None:
-    """A robot ends a turn in a gap. After the gap, the odometry is reset.
+    """A robot ends a turn in a gap, and the odometry is reset after the gap.
 
-    The odometry does not know the robot's heading in the board's frame until the next poses show
-    it. After these poses, odom has no error.
+    When the next poses have shown the heading in the board's frame, odom has no error.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=use_board_pose)), Trip(0.7)
     attach(odometry, trip.pose)
@@ -270,13 +259,9 @@ def test_a_reset_after_a_gap_leaves_no_wrong_heading(
 def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
     duration_s: float | None,
 ) -> None:
-    """A reset of the odometry in a gap of 3 s decides whether odom contains the lost motion.
+    """The odometry is reset in a gap of 3 s, near the beginning or near the end of the gap.
 
-    If the reset is near the beginning of the gap, odom contains the lost motion. If the reset is
-    near the end, odom does not contain the lost motion.
-
-    In both cases, the odometry publishes one estimate for the first displacement after the gap.
-    After a reset near the end, this estimate has a pose of zero and an unknown twist.
+    Odom contains the lost motion only after a reset near the beginning.
     """
     for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
         odometry, trip = Odometry(SETTINGS), Trip()

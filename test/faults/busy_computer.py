@@ -33,17 +33,16 @@ comparison.
 REACH: Final = 200
 """Limit, in frames, of the search for the sent frame that equals a published message.
 
-The search begins after the last frame that was found. If no frame within the limit equals the
-message, the message is wrong.
+The search begins after the last frame that was found. A message without an equal frame is wrong.
 """
 
 
 class PiecesTerminal(Terminal):
     """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
-    After a delay of its thread, the terminal delivers all bytes together that arrived meanwhile.
+    Bytes that arrive during a delay are delivered together.
 
-    ``silent_s``: the longest time between two deliveries so far, in s.
+    ``silent_s``: longest time between two deliveries so far, in s.
     """
 
     silent_s = 0.0
@@ -126,8 +125,7 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages match no frame, and how many frames are skipped between matches.
 
-    The comparison begins at a frame that equals the first message. If several frames equal it, the
-    result with the fewest errors counts.
+    The comparison begins at the frame that equals the first message and gives the fewest errors.
     """
     starts = [n for n, key in enumerate(sent) if published and same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

@@ -209,7 +209,7 @@ class Campaign(Outcome):
 
         ``number_of_life``: index in ``LIVES`` of the stops that each driver performs.
 
-        ``numbers``: one number for each driver, which selects the lost bytes.
+        ``numbers``: one seed for each driver, for the board's settings and the losses.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

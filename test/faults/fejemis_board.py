@@ -26,8 +26,7 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 class Pair:
     """Both simulated Teensys, with the interface of a single board.
 
-    ``tick``: number of ticks of the fault campaign so far. One such tick is ``TICKS`` ticks of the
-    boards.
+    ``tick``: number of ticks of the fault campaign so far, each of ``TICKS`` ticks of the boards.
 
     ``received``: motion commands to the drive board, without checksums and padding.
     """
@@ -89,8 +88,7 @@ def half_restarts(half: str) -> Any:
 def half_is(half: str, what: str, allowed_s: float) -> Any:
     """Make a case in which one Teensy (``half``) has the fault ``what`` while the robot drives.
 
-    ``allowed_s``: time in s within which the robot must stop although commands continue; 0 if it
-    need not stop during the fault.
+    ``allowed_s``: time limit in s for the robot's stop during the fault; 0 if no stop is needed.
     """
 
     def case(rig: Rig) -> None:

@@ -55,8 +55,8 @@ def sent_odom_key(frame: bytes) -> Key | None:
 def not_sent(published: Iterable[Key | None], sent: Iterable[Key | None]) -> int:
     """Return how many published messages the board has not sent, or has sent in another order.
 
-    ``published``, ``sent``: the values of each message and of each frame, in the frame's units.
-    Messages and frames with None are skipped.
+    ``published``, ``sent``: the values of each message or frame, in the frame's units. None is
+    skipped.
     """
     truth = [key for key in sent if key is not None]
     at = missing = 0

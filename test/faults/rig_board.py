@@ -18,8 +18,7 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the fault campaign.
 
-    ``ports``: function that returns the driver's port parameters. Its argument is the name of the
-    port.
+    ``ports``: returns the driver's port parameters for the name of the port.
 
     ``old_command``: the bytes of a motion command, with which tests fill the port.
 
@@ -27,7 +26,7 @@ class RigBoard:
 
     ``opening``: the first bytes that the board gets after its port is opened.
 
-    ``tuning``: names of parameters. The driver must reject invalid values of them.
+    ``tuning``: names of the parameters whose invalid values the driver must reject.
 
     ``off_within_s``: longest time from the driver's stop command until the motors are off.
 
@@ -35,8 +34,8 @@ class RigBoard:
 
     ``ends_later_s``: time that is added to the usual limit for the driver's end.
 
-    ``rests_later_s``: time that is added to the usual limit for the robot to come to rest after
-    several simultaneous faults.
+    ``rests_later_s``: time that is added to the limit for the robot to come to rest after several
+    simultaneous faults.
 
     ``deaf_s``: longest time for which the board may ignore its input.
 
@@ -46,21 +45,21 @@ class RigBoard:
 
     ``sent``: returns the frames of the board's last tick.
 
-    ``not_sent``: compares the published messages with the frames that the board has sent. For each
-    kind of message, it returns the kind, the number of published messages that the board has not
-    sent, and the number of all published messages.
+    ``not_sent``: returns, for each kind of message, its name, the number of published messages that
+    the board has not sent, and the number of all published messages.
 
     ``lossy``: returns the settings of the n-th board behind a lossy line.
 
-    ``line``, ``serve``: functions that make the board's line and its server. ``None`` means a
-    serial line, simulated by a pseudo-terminal.
+    ``line``, ``serve``: functions that make the board's line and its server.
 
-    ``cases``: returns the faults of the n-th round. ``None`` means the faults of a serial line.
+    ``cases``: returns the faults of the n-th round.
 
-    ``steps``: the faults from which a random walk chooses. ``None`` means the faults of a serial
-    line.
+    ``steps``: the faults from which a random walk chooses.
 
     ``without``: faults and parts of the campaign that do not apply to this board.
+
+    In ``line``, ``serve``, ``cases`` and ``steps``, ``None`` means the default for a simulated
+    serial line.
     """
 
     name: str

@@ -18,10 +18,9 @@ LOST: Final = "lost .*retrying"
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
     """Let the adapter hold back the bytes to the board, and then deliver all of them at once.
 
-    After this delivery, the robot must be at rest.
+    After the delivery, the robot must be at rest.
 
-    ``seconds``: time for which the user commands the robot while the adapter holds the bytes. The
-    adapter delivers the bytes 1 s after this time.
+    ``seconds``: duration of the commands, which end 1 s before the delivery.
 
     ``mute``: whether the driver gets no data from the board until the delivery.
     """

@@ -2,8 +2,8 @@
 
 """Faults in random order, several of them at the same time, while random commands move the robot.
 
-Every few steps, the commands and most faults end, and the robot must come to rest, even if bytes to
-the board are still damaged. Then all faults end, and the robot must obey a new command.
+Every few steps, the commands and most faults end, and the robot must come to rest. When all faults
+have ended, the robot must obey a new command.
 """
 
 from collections.abc import Callable
@@ -20,8 +20,7 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-The line to the board may have been cut until the end of the commands, or may still be damaged, so
-this limit has a margin.
+The limit has a margin for a line to the board that was cut, or is still damaged.
 """
 
 

@@ -28,9 +28,8 @@ class Bound:
 
     ``one_wrong_in_hidden``: the same number for chunkings that hide the idle gaps.
 
-    ``delivered``: least share of the intact frames that must be decoded. The value 1.0 means that
-    all intact frames of a stream after its first two must be decoded. For the chunkings in
-    ``BUSY_LOOPS``, the share is at most 0.999.
+    ``delivered``: least share of the intact frames that must be decoded. With 1.0, only the first
+    two frames of a stream may be missing.
 
     ``chunkers``: names of the chunkings that have these limits.
     """

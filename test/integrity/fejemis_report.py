@@ -37,7 +37,7 @@ BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 1
 """Limits for each fault on lines with checksums.
 
 Each element is the least share of values that must be published, and the number N in "at most one
-value in N may be wrong". N = 0 means that no value may be wrong.
+value in N may be wrong" (0: no value).
 """
 ASTRAY_M: Final = 0.02
 

@@ -15,9 +15,8 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-The judge skips true frames until one equals the decoded frame. After a larger skip, the two frames
-may be equal by chance. So the judge then searches for the next decoded frame of the same read. If
-the judge again skips more than ``MOST_DROPPED`` frames, it counts the first decoded frame as wrong.
+After a larger skip, the frames may be equal by chance, so the next decoded frame of the read (if
+any) must confirm the match.
 """
 REACH_BYTES = 600
 """How far before a read the judge begins to search for the frames of the read, in received bytes.

@@ -119,8 +119,8 @@ def drive(name: str, seconds: float, seed: int) -> Score:
 def _watch(bench: MartBench, score: Score) -> None:
     """Run for 0.1 s, and count right and wrong messages.
 
-    An odometry message is compared with the true pose at its publication. All other messages are
-    compared with the true values at the end of the 0.1 s.
+    An odometry message is compared with the true pose at its publication, all others with the true
+    values at the end.
     """
     seen = len(bench.events)
     for _ in range(10):

@@ -37,8 +37,7 @@ BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 class Bound:
     """Limits of the errors that ``outbound_judge`` defines.
 
-    Two errors are never allowed: motion while the driver does not drive, and bytes of a frame that
-    the board takes for letters (S, P, R).
+    Stray motion and false letters are never allowed.
 
     ``share``: largest allowed share of the driving time in which an uncommanded set-point is
     active.

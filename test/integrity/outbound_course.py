@@ -24,12 +24,6 @@ class Understood:
 
     ``alike_until``: for each write, the index of the next write that is unlike it, or the number of
     writes if there is none.
-
-    A write is unlike the writes before it in three cases:
-
-    * It begins or ends a motion.
-    * It waits until the line has sent an earlier write.
-    * The receiver understands something different from the control frames in the write.
     """
 
     held: list[bytes]
@@ -52,8 +46,9 @@ class Course:
     def when(self, tick: int, shown: Shown) -> "Course":
         """Return a variant of this course, in which the board reports ``shown`` from ``tick`` on.
 
-        The scene stays the same, and so do the board's states before ``tick``. ``shown``: the mode
-        of the board, and whether the robot moves.
+        The states before ``tick`` stay the same.
+
+        ``shown``: the mode of the board, and whether the robot moves.
         """
         other = self._others.get((tick, shown))
         if other is None:
@@ -91,10 +86,12 @@ class Course:
             says: list[tuple[int, Command]] = [
                 (at, ControlFrame(mode, words)) for at, mode, words in items.frames
             ]
+            # A write that waits for an earlier write on the line is unlike the writes before it.
             plain.append(heard == says and not waits)
         until = [len(self.writes)] * len(self.writes)
         for number in reversed(range(len(self.writes) - 1)):
             after = number + 1
+            # A write that begins or ends a motion is unlike the writes before it, too.
             alike = plain[after] and self.items[after].moves == self.items[number].moves
             until[number] = until[after] if alike else after
         return Understood(held, until)

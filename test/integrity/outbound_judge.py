@@ -154,8 +154,6 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return "false letter" if it is false, else "".
 
-        A letter is false if the driver sent this byte as a part of a frame.
-
         ``at``: position of the letter in the write; negative if faults of the line have added or
         changed the letter.
         """
@@ -167,10 +165,9 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the active set-point at ``at_s``. If the set-point is an error, count its duration.
+        """End the active set-point at ``at_s``.
 
-        An *uncommanded* set-point is in neither of the last two writes of the driver. A *stray*
-        set-point moves the robot while the driver does not drive.
+        If the set-point is uncommanded or stray, count its duration.
         """
         score = self.score
         if self._uncommanded_from_s is not None:

@@ -16,9 +16,8 @@ CHANGED: Final = -2
 Arrival = tuple[int, float, int]
 """A byte that arrives: its value, its place, and its origin.
 
-The place is the byte's position in the driver's write. An added byte lies between two positions,
-so its place is a number such as 3.5. The origin of an undamaged byte is equal to its place. The
-origin of an added or changed byte is ``ADDED`` or ``CHANGED``.
+* Place: the position in the driver's write; for an added byte, a number such as 3.5.
+* Origin: equal to the place; for an added or changed byte, ``ADDED`` or ``CHANGED``.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 

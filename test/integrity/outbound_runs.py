@@ -27,8 +27,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Minimum number of trials of all scenes in ``ENDED``, for each receiver and rate of lost bytes.
 
-The scenes share the trials equally. One exception: with 1 byte in 100 lost, there are ``NEEDED``
-trials of each scene in ``HURRIES``.
+The scenes share the trials equally. With 1 byte in 100 lost, each scene in ``HURRIES`` has
+``NEEDED`` trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"

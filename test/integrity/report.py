@@ -136,8 +136,8 @@ def main() -> int:
 def write(figures: str, begin: str, all_hold: bool) -> int:
     """Print the figures, write them into docs/internals/integrity.md, and return the exit code.
 
-    The figures replace the text between the comments ``begin`` and ``END`` in this document. The
-    exit code is 0 if all limits hold (``all_hold``), else 1.
+    The figures replace the text between ``begin`` and ``END``. The exit code is 0 if all limits
+    hold, else 1.
     """
     print(figures)
     before, rest = DOCUMENT.read_text().split(begin)

@@ -2,9 +2,8 @@
 
 """Tests of an installation with ``OMNIBOT_DRIVER_COMPILE=1``, which compiles a part of the core.
 
-mypyc and the C compiler take a minute, so each test replaces one of them. Most tests replace mypyc
-by code that writes one small C module. One test runs mypyc, and replaces the C compiler by a
-program that does nothing.
+To save time, most tests replace mypyc by code that writes one small C module. One test runs mypyc,
+and replaces the C compiler by a program that does nothing.
 """
 
 import os
@@ -53,9 +52,13 @@ FAILURES = {
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
     """Build the package into ``lib`` in ``folder``, and return the output of the build.
 
-    A substitute replaces mypyc. ``fails``: Python statement that the substitute runs first, for
-    example to fail. ``source``: C code that it writes. ``wanted``: value of
-    ``OMNIBOT_DRIVER_COMPILE``.
+    A substitute replaces mypyc.
+
+    ``fails``: Python statement that the substitute runs first.
+
+    ``source``: C code that the substitute writes.
+
+    ``wanted``: value of ``OMNIBOT_DRIVER_COMPILE``.
     """
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()

@@ -55,8 +55,7 @@ def test_every_rule_matches_before_it_assigns() -> None:
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
     """The udev rules of all four adapters set the same name, /dev/omnibot, and the same rights.
 
-    The group dialout gets access. In the file, all of these rules except one are commented out. The
-    test reads all four rules.
+    The test also reads the rules that are commented out in the file.
     """
     assert len(OFFERED) == 4
     for rule in OFFERED:
@@ -136,8 +135,7 @@ def test_systemd_accepts_the_unit() -> None:
 def test_the_first_process_of_a_container_outlives_the_guard() -> None:
     """After a crash of the driver, the container's first process lives longer than the guard.
 
-    The guard repeats Stop for a second after the crash. When the first process ends, the kernel
-    kills the guard, so the first process must not end during this second.
+    If the process ended earlier, the kernel would kill the guard, which repeats Stop for a second.
     """
     (pause_s,) = re.findall(r"^time\.sleep\(([\d.]+)\)$", OUTLIVE.read_text(), re.MULTILINE)
     assert float(pause_s) > guard.TIMES * guard.PACE_S

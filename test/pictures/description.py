@@ -218,8 +218,7 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
     """Draw transparent solids over the colours behind them, from the lowest to the highest.
 
-    A steep face hides 42 % of the colour behind it. Other faces hide 10 % if seen straight on, and
-    up to 40 % if seen at a flat angle.
+    Each face hides 10 to 42 % of the colour behind it. Steep faces hide the most.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

@@ -56,8 +56,8 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """Return a function that starts a probe: a ROS node that observes and commands one driver.
 
-    The probe publishes a message again if the driver refused it because of a stall. It repeats a
-    service call if the answer was lost.
+    The probe repeats a message that the driver refused because of a stall, and a service call whose
+    answer was lost.
     """
 
     def start(driver: Driver) -> Probe:

@@ -226,9 +226,8 @@ def board_poses(
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
     """Return the deltas in a board's frames, the pose after each delta, and an IMU index for each.
 
-    The board sends its exact pose after every fifth delta. After the other deltas, the pose is the
-    last exact pose plus the rounded deltas since then. The IMU index of a delta is the index of the
-    last IMU frame before it.
+    * Pose: the last exact pose from the board plus the rounded deltas since then.
+    * IMU index: the index of the last IMU frame before the delta.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []

@@ -24,8 +24,7 @@ from typing import NoReturn
 LARGEST_REQUEST = 1 << 17
 """Maximum size, in bytes, of a request to the nursery. The end of a larger request is lost.
 
-A request makes the nursery fork a process for a driver. The request contains the driver's arguments
-and environment, and Python code that this process runs before the driver.
+A request contains a driver's arguments and environment, and Python code to run before the driver.
 """
 
 

@@ -52,8 +52,8 @@ def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
 def ros() -> Iterator[None]:
     """Set up ROS, and keep one node until the end of the tests.
 
-    The node keeps the middleware's participant alive. Without it, the end of a probe could delete
-    the participant, and Fast DDS has crashed in such a case.
+    The node keeps the middleware's participant alive: Fast DDS has crashed when the end of a probe
+    deleted the participant.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)
@@ -171,8 +171,7 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again after some seconds, when a stall is over.
 
-        The wait is longer than ``WARN_EVERY_S`` (s), in which the driver logs each kind of refusal
-        at most once. If the driver refuses the message again, this refusal is therefore logged.
+        The wait is longer than ``WARN_EVERY_S``, so that the driver logs a second refusal, too.
         """
 
         def publish() -> None:

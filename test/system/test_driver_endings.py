@@ -135,8 +135,7 @@ threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20
 """
 """Code for the driver's process: a callback blocks the executor until the driver ends.
 
-The callback returns when the driver has asked the executor to end. The code also makes the driver
-wait 20 times longer than usual for its threads to end.
+The code also makes the driver wait 20 times longer than usual for its threads to end.
 """
 
 

@@ -167,8 +167,7 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 ) -> None:
     """The computer is suspended while the robot drives. Afterwards, the driver stops the robot.
 
-    The driver stops the robot because it detects a stall. The command timeout would not stop the
-    robot, because the clock of this timeout does not count the suspension.
+    The driver detects a stall: the clock of the command timeout does not count the suspension.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(

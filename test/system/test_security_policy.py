@@ -158,12 +158,8 @@ def test_operators_and_observers_may_read_all_commands(file: str) -> None:
 def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> None:
     """A node of each enclave may offer the services that every rclpy node has.
 
-    The node must have the name in its enclave's profile, but the operator's tools may choose their
-    names. Only the driver's and the operator's enclaves may offer other services. So no other node
-    can answer in the driver's name.
-
-    Regression: under SROS2, no node of these enclaves could start, because the policy allowed the
-    nodes no services.
+    Only the driver's and the operator's enclaves may offer others, so no other node can answer in
+    the driver's name.
     """
     for path, profile in profiles(POLICY.with_name(f"{file}.policy.xml")).items():
         name = "monitor_1" if path == "/omnibot/operator" else profile.attrib["node"]
@@ -172,6 +168,7 @@ def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> N
         try:
             node = Node(name, context=context)
             rules = allowed(profile)
+            # Under SROS2, a node cannot start if the policy does not allow these services.
             for service in node.services:
                 assert any(fnmatch(service.service_name, one) for one in rules["reply"]), path
             assert {publisher.topic_name for publisher in node.publishers} <= rules["publish"]

@@ -49,8 +49,9 @@ def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
 def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
     """Return the lines of a Markdown table with one row for each case.
 
-    A row has the worst and the median result, and how many streams keep ``LIMITS_S``. ``head``:
-    headings of the case's columns. ``rows``: results by case.
+    A row has the worst and the median result, and how many streams keep ``LIMITS_S``.
+
+    ``head``: headings of the case's columns.
     """
     lines = [
         f"| {head} | steps, RMS error (ms) | 99 % within (ms) | streams that keep both limits |",
@@ -98,8 +99,8 @@ def publish(name: str, lines: list[str]) -> None:
 def lines_and_events(seconds: float, seeds: int) -> None:
     """Measure the stamps on each kind of line, without an event and with each kind of event.
 
-    An event is a restart of the board or a stall of the host. Between events, the host reads
-    promptly. The results are written into docs/internals/time.md.
+    Events are a restart of the board and stalls of the host. The results are written into
+    docs/internals/time.md.
     """
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]

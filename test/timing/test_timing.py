@@ -17,8 +17,7 @@ SCENARIOS = pytest.mark.parametrize(
 def test_lost_bytes_shift_no_stamps(line: str, scenario: str, skew: float) -> None:
     """One byte in 1000 is lost, but the intervals between stamps are even within 0.2 ms (RMS).
 
-    The errors of 99 % of the stamps differ from a constant offset by less than 0.5 ms. The first
-    2 s of the stream are left out.
+    The errors of 99 % of the stamps differ from a constant offset by less than 0.5 ms.
     """
     stamped = stamp(line, scenario, 1e-3, skew, 0, 10.0)
     assert stamped.unevenness() < 0.2e-3
@@ -55,8 +54,8 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 ) -> None:
     """The board restarts, or the host stalls, on a line with an FTDI adapter.
 
-    The errors of 99 % of the stamps differ from one constant offset by less than 0.5 ms, before and
-    after the event. The first 2 s after a start of the board are left out.
+    The errors of 99 % of the stamps stay within 0.5 ms of one offset. The first 2 s after a start
+    are left out.
     """
     stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, skew, 0, 20.0, event)
     assert stamped.unevenness() < 0.2e-3
@@ -66,8 +65,7 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
     """If an FTDI timer cuts no frame in two, all stamps are late by one frame's duration ±0.5 ms.
 
-    Only a cut frame would show the timer's exact phase. Without one, the driver assumes the middle
-    of the possible phases, so its error is at most half of their range.
+    Without a cut frame, the driver assumes the middle of the timer's possible phases.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within
@@ -80,10 +78,10 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 @pytest.mark.parametrize("reader", [name for name in BUSY if "parts" not in name])
 @SCENARIOS
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str, skew: float) -> None:
-    """The stamps are as accurate as usual if a busy computer reads late.
+    """A busy computer reads late, but the stamps are as accurate as usual.
 
-    The test omits readers that take only some of the waiting bytes in each read. With these
-    readers, some stamps are wrong by a tick.
+    The test omits readers that take only some of the waiting bytes: they shift some stamps by a
+    tick.
     """
     stamped = stamp(reader, scenario, 0.0, skew, 0, 10.0)
     assert spread(stamped.errors()) < 0.5e-3

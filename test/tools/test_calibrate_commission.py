@@ -44,8 +44,7 @@ def test_the_whole_walk_finds_what_was_planted(
 ) -> None:
     """The tool finds that a robot has reversed axes, a turned IMU, and deltas in the body's axes.
 
-    The user's first answer is impossible, and the tool says so. A driver can load the calibration
-    file that the tool writes.
+    The tool rejects the user's impossible first answer. A driver can load the calibration file.
     """
     with rig(
         tmp_path,
@@ -129,8 +128,8 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
 ) -> None:
     """If one axis is reversed, the tool finds the signs of all axes.
 
-    A note says that these signs describe a mirror image of the robot. The answer "r" repeats the
-    motion; an invalid answer repeats the question.
+    A note mentions a mirror image of the robot. The answer "r" repeats the motion; an invalid
+    answer repeats the question.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

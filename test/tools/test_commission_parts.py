@@ -223,8 +223,7 @@ def resting(
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
     """A turn by hand is accepted only if it is to the left and large enough.
 
-    ``require_left_turn`` computes the turn about the vertical from the gyro, without its bias. For
-    a turn to the right or a small turn, it raises Contradiction.
+    ``require_left_turn`` returns the turn in rad, without the gyro's bias, or raises Contradiction.
     """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
@@ -315,9 +314,9 @@ def test_the_wrong_frame_turns_with_the_robot(
 ) -> None:
     """Two equal commands, before and after a turn, show whether the assumed delta frame is right.
 
-    * Right frame: the odometry shows the same direction in the body's axes.
-    * Wrong frame: the direction changes by the angle of the turn.
-    * Any other change: an error.
+    * Same direction in the body's axes: right.
+    * Direction changed by the angle of the turn: wrong.
+    * Any other change: ToolError.
     """
 
     def heading(rad: float) -> Drift:
@@ -334,9 +333,9 @@ def test_the_wrong_frame_turns_with_the_robot(
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
     """The odometry of a turn on the spot shows whether the driver interprets deltas correctly.
 
-    In 40 ms at 0.5 rad/s, the robot turns by 20 mrad, and each wheel by 24 counts. If the driver
-    confuses displacements with wheel counts, the odometry also shows linear motion.
+    If the driver confuses displacements with wheel counts, the odometry also shows linear motion.
     """
+    # In 40 ms at 0.5 rad/s, the robot turns by 20 mrad, and each wheel by 24 counts.
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
     as_counts = steady(0.0, 2 / 3 * 200 * rim / 0.04, -200 * rim / 0.04 / (3 * 0.143))

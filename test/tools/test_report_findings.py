@@ -240,10 +240,10 @@ def beside(drive: Drive, *streams: dict[str, str]) -> Log:
 
 
 def test_the_rate_of_another_robot_is_not_expected(drive: Drive) -> None:
-    """A bag has an OmniBot and a MART, and does not show which rate ``odom`` should have.
+    """A bag with an OmniBot and a MART does not show which rate ``odom`` should have.
 
-    The report gives the rate of ``odom`` only in a note. Only the OmniBot has an IMU, so the report
-    expects the 100 Hz of the OmniBot's IMU.
+    The report gives the measured rate only in a note, but expects 100 Hz of the IMU, which
+    only the OmniBot has.
     """
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.odom, name, getattr(drive.odom, name)[::2])
@@ -277,11 +277,11 @@ def test_the_imu_of_another_robot_is_not_expected(
     topics: tuple[str, ...],
     level: Level | None,
 ) -> None:
-    """The finding about missing IMU messages depends on which of two robots have an IMU.
+    """A bag of two robots has no IMU messages. The finding depends on which robots have an IMU.
 
-    * Both have an IMU, or a topic of this robot is for an IMU: BAD.
-    * Only one has an IMU, and no topic shows which: NOTE.
-    * Neither has an IMU: no finding.
+    * Both have one, or a topic of this robot is for an IMU: BAD.
+    * Only one has one, and no topic shows which: NOTE.
+    * Neither has one: no finding.
     """
     drive.imu.drop(0.0, 99.0)
     for alone in (False, True):
@@ -293,8 +293,7 @@ def test_the_imu_of_another_robot_is_not_expected(
 def test_no_rate_of_an_omnibot_is_expected_of_two_wheels(drive: Drive) -> None:
     """The report gives no verdict on the rate of odom if no rate is expected.
 
-    This recording has no diagnostics, which would give the expected rate. The robot has two wheels,
-    so the rate of an OmniBot does not apply.
+    The recording has no diagnostics, and the OmniBot's rate does not apply to two wheels.
     """
     drive.statuses.clear()
     drive.joints.values = drive.joints.values[:, :2]

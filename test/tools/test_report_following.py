@@ -66,8 +66,8 @@ def test_slow_motors_that_reach_the_commanded_speed_are_good(slow_s: float) -> N
 def test_slow_motors_do_not_hide_a_wrong_scale() -> None:
     """A robot with slow motors finally reaches only 80 % of the commanded yaw rate.
 
-    The report warns, and gives this ratio. The robot has two wheels, so the advice is to check a
-    drive with a tape measure, not to change a scale of the odometry.
+    The report warns and gives this ratio. For two wheels, it advises a check with a tape measure,
+    not a new scale.
     """
     commands = stretches(3.0)
     found = verdict(commands, behind(commands, 0.3) * [1.0, 1.0, 0.8])
@@ -95,8 +95,7 @@ def test_commands_that_always_change_give_no_advice_on_scales(wheels: tuple[str,
 def test_a_speed_that_still_swings_gives_no_advice_on_scales() -> None:
     """The robot's speed swings all the time, and its mean is 15 % above the commanded speed.
 
-    The speed does not become steady before the command changes. So the report gives the ratio of
-    measured to commanded speed only in a note.
+    So the report gives the ratio of measured to commanded speed only in a note.
     """
     commands = stretches(3.0)
     swing = 1.15 + 0.2 * np.sin(2 * np.pi * TIMES_S / 1.5)

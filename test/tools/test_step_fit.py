@@ -62,8 +62,7 @@ def test_a_motor_is_found_in_the_manuals_loop(
 ) -> None:
     """The fit finds the parameters of a motor in a control loop with the gains of the manual.
 
-    Each error is less than five times the standard deviation that the fit gives for the parameter.
-    A model of first order does not fit better.
+    Each error is below five standard deviations. A model of first order does not fit better.
     """
     planted = (1.0, pwm_per_count, lag_s, delay_s)
     steps = made_up(motor_model(MANUAL), planted, seed)

@@ -155,9 +155,8 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """The proposed gains keep the limits of Ms (maximum sensitivity) and overshoot.
 
-    Compared with the manual's gains, the error after a change of the load is smaller, and the error
-    after a command may be larger. The two errors, each divided by its value with the manual's
-    gains, add up to less than 2.
+    Relative to the manual's gains, the error after a load change is below 1. Together with the
+    error after a command, it adds up to less than 2.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)

@@ -110,8 +110,8 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
 ) -> None:
     """A port on a real terminal makes the terminal exclusive until the port is closed.
 
-    While the terminal is exclusive, only root can open it again. This also keeps out programs that
-    use no locks. A pseudo-terminal is not made exclusive.
+    Only root can then open the terminal again, which keeps out programs without locks. A
+    pseudo-terminal is not made exclusive.
     """
 
     def exclusive() -> bool:

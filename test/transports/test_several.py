@@ -28,8 +28,7 @@ PATIENCE_S = 10.0
 class Ends:
     """The ends of two lines: ``far`` has the boards' ends, ``near`` has the driver's ends.
 
-    ``paths``: symbolic links to the driver's ends. The link of a lost line is removed, because
-    another program may get a terminal with the same name.
+    ``paths``: symbolic links to the driver's ends. The link of a lost line is removed.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -44,6 +43,7 @@ class Ends:
             self.paths.append(str(link))
 
     def hang_up(self, number: int) -> None:
+        # Another program may get a terminal with the same name.
         Path(self.paths[number]).unlink(missing_ok=True)
         for ends in (self.far, self.near):
             if ends[number] >= 0:
@@ -141,8 +141,7 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
     """A write does not wait for a full line, and the other line gets its data at once.
 
-    The full line accepts no data for 0.2 s, so the line is reported as missing, and its old data is
-    discarded.
+    After 0.2 s, the full line is reported as missing, and its old data is discarded.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -263,9 +262,8 @@ def test_of_two_drivers_that_wait_for_the_same_lines_one_gets_both(
 ) -> None:
     """Two drivers wait for the same two lines, and each driver has opened one of the lines.
 
-    The *leading* line is the one whose device has the first path in alphabetical order. The driver
-    without this line gives up, so the other driver gets both lines. The order in which the drivers
-    name the lines does not matter.
+    Both go to the driver with the *leading* line, which has the first device path in alphabetical
+    order.
     """
     leading, other = sorted(ends.paths, key=os.path.realpath)
     late = tmp_path / "late"

@@ -17,8 +17,8 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: functions of the number of a tick. They return the upper and the lower
-    bound of the tick's time, relative to the true time of the tick, in s.
+    ``above``, ``below``: return the bounds of the time of a numbered tick, relative to its true
+    time, in s.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
@@ -83,10 +83,9 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """A lower bound for the time of a tick is discarded if it contradicts the upper bounds.
+    """A late read gives a lower bound that contradicts the upper bounds of a tick's time.
 
-    An upper bound is always right, because each read comes after its tick. A late read can give a
-    wrong lower bound.
+    The clock discards this lower bound, because an upper bound is always right.
     """
     _, late_s = followed(
         0.0,

@@ -12,8 +12,8 @@ from omnibot_driver.core.errors import ParameterError
 def test_commands_are_slow_in_a_terminal_mode() -> None:
     """In a terminal mode, a command rate above 25 Hz is rejected.
 
-    In this mode, the public firmware forwards each command to a sensor, for example at 4800 baud.
-    At a higher rate, a stop would arrive late or never.
+    The public firmware then forwards each command to a slow sensor, so a stop would arrive late or
+    never.
     """
     with pytest.raises(ParameterError, match="at most 25 Hz"):
         PARAMETERS.check_all({"terminal_mode": "compass", "command_rate": 30.0})

@@ -80,11 +80,7 @@ def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
     """If one of the requested symbolic links cannot be made, the program makes none of them.
 
-    The three cases are:
-
-    * The board has fewer serial ports than links.
-    * A file already has the name of a link.
-    * The board has only a UDP port.
+    Cases: too few serial ports, a file with the name of a link, a board with only a UDP port.
     """
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):

@@ -139,8 +139,8 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
     """While one half is silent, hung or unplugged, the other half sends, and the robot drives on.
 
-    A half that is only silent still obeys commands. A hung or unplugged half does not. When the
-    fault ends, the half sends again.
+    Of the three, only a silent half still obeys commands. When the fault ends, the half sends
+    again.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
@@ -238,8 +238,9 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
     """The front board reports a frozen, an absent and a faulty angle sensor in different ways.
 
-    With a frozen sensor, the angle stays the same while the wheel turns. With an absent sensor, the
-    angle is 0, and the diagnosis changes. With a sensor in error, an error flag is set.
+    * Frozen: the angle stays the same.
+    * Absent: the angle is 0, and the diagnosis changes.
+    * Faulty: an error flag is set.
     """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")

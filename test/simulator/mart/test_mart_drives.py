@@ -337,8 +337,8 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
     """A backward drive (B) ends if the rear sonar measures less than 15 inches.
 
-    The robot moves 2 inches before the first measurement, so an obstacle that is 15.5 inches behind
-    at the start ends the drive, too.
+    The robot moves 2 inches before the first measurement, so an obstacle at 15.5 inches ends the
+    drive.
     """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)

@@ -27,8 +27,7 @@ IN_SOURCE_ALONE = (
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
     """Return whether the server regards a drive (F) as in progress after SL has stopped the robot.
 
-    SL is a stop on the stop port. If the drive counts as in progress, the server refuses other
-    motions. A later stop with SM then makes the command port hang.
+    If so, the server refuses other motions, and a later stop with SM makes the command port hang.
     """
     rig = Rig(quirks)
     rig.drive("F")
@@ -96,10 +95,9 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """Return whether a forward drive (RM) fails if the robot has just taken 0.57 s to stop.
+    """Return whether a forward drive (RM) fails after a stop (SRM) that took 0.57 s.
 
-    Cause: the RM continues the sample count of the stop (SRM) instead of counting from 0. If this
-    RM fails, the function checks that a second RM succeeds.
+    If so, the RM has continued the sample count of the stop. A second RM must succeed.
     """
     rig = Rig(quirks)
     rig.drive("RM 66")

@@ -174,8 +174,8 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 def test_a_sonar_measures_three_times_what_is_near() -> None:
     """A sonar measures three times if an obstacle is near, so its reply comes later.
 
-    The front sonar reads 19 inches, which is near: the limit is 19 inches. The rear sonar reads 16
-    inches, which is not near: the limit is 15 inches.
+    The front sonar reads 19 inches, and its limit is 19. The rear sonar reads 16 inches, and its
+    limit is 15.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"

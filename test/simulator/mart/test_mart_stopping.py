@@ -201,7 +201,7 @@ def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() 
     """A stop (SL) in the first moments of a controlled move is ignored, or ends the move late.
 
     * After 0.03 s: the server completes the move.
-    * After 0.1 s: the robot drives on, and the move ends about 0.85 s after SL.
+    * After 0.1 s: the move ends about 0.85 s after SL.
     """
     rig = Rig()
     rig.say("TF 24")

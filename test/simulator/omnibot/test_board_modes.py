@@ -197,8 +197,7 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
     """A receiver of the kind ``idle_gap`` discards an incomplete frame after a pause on the line.
 
-    The board measures the pause by the arrival times of the bytes. If the bytes have no arrival
-    times, the board measures the pause in ticks.
+    The board measures the pause by arrival times, or in ticks if the bytes have no arrival times.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))

@@ -198,10 +198,10 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """A receiver of the kind ``window`` finds two frames that overlap.
+    """The first word of a frame is -2 (FF FE), which is also the header of a second frame.
 
-    The first word of the first frame is -2 (FF FE), which is also the header of the second frame. A
-    receiver of the default kind finds only the first frame.
+    A receiver of the kind ``window`` finds both frames, a receiver of the default kind only the
+    first.
     """
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))

@@ -263,10 +263,9 @@ def test_a_calibration_of_the_board_ends_the_drivers_own_bias(
 def test_power_off_is_refused_while_driving(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver refuses ``~/power_off`` during a drive. At rest, the power goes off after a delay.
+    """The driver refuses ``~/power_off`` during a drive.
 
-    On a busy computer, the robot may already be at rest at the first call. The test then cancels
-    the power-off by ``~/start``, and tries again.
+    At rest, the power goes off after a delay.
     """
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))
@@ -276,6 +275,7 @@ def test_power_off_is_refused_while_driving(
             answer = probe.call(Trigger, "power_off")
         if not answer.success:
             break
+        # On a busy computer, the robot was already at rest. Cancel the power-off, and try again.
         assert probe.call(Trigger, "start").success
     assert not answer.success, answer.message
     robot.stands_for_good()

@@ -50,10 +50,10 @@ New = tuple[Ecu, Driver, Probe]
 def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board(
     firmware: str, stack: ExitStack, start_driver: Start, probe_of: Start
 ) -> None:
-    """Odometry is right within 3 cm after a drive, and continues across a restart of the board.
+    """The robot drives, the board restarts, and the robot drives again.
 
-    After the restart, the driver writes gains and periods again. The final error is at most 8 cm,
-    or 3 sigma if this is more.
+    The odometry is right within 3 cm before the restart, and within 8 cm (or 3 sigma, if more)
+    after the restart. The driver writes gains and periods again.
     """
     ecu = ecu_of(firmware, stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", ticks_period=0.2, **GAINS))
@@ -149,8 +149,7 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """``~/reset`` sets the board's tick counts to 0, but the pose in odom continues.
 
-    When the robot drives again, no step of the pose is as large as 0.25 m. Steps of up to 0.15 m
-    are normal, because the board reports its tick counts only every 400 ms.
+    No step of the pose reaches 0.25 m. Steps of up to 0.15 m are normal with one report in 400 ms.
     """
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for(lambda: odometry)

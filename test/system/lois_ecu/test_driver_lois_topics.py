@@ -47,10 +47,10 @@ def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
 def test_gps_time_and_heading_are_published_where_the_board_tells_them(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """If the compass shows east and the declination is 0.1 rad, the published heading is -0.1 rad.
+    """The driver publishes the board's GPS fix, time and heading.
 
-    In the ENU frame, east is 0 and left is positive. Magnetic east is 0.1 rad to the right of true
-    east.
+    If the compass shows east and the declination is 0.1 rad, the heading is -0.1 rad: magnetic east
+    is to the right of true east.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(

@@ -293,10 +293,9 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 
 
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
-    """The tool refuses a record in which every time is the largest number that the record can hold.
+    """All times in a record are the largest possible: 6.6 ms in the manual's unit of 100 ns.
 
-    The true times may be longer than this number. In the manual's unit of 100 ns, the number means
-    only 6.6 ms, which is less than the usual time between ticks.
+    The tool refuses the record, because the true times may be longer.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"

@@ -28,8 +28,8 @@ def test_a_robot_is_calibrated_from_its_records(
 ) -> None:
     """``calibrate step`` finds the constants of both wheels, and sets corrections and gains.
 
-    The robot has encoder marks that are 10 % off, unequal wheels, dead time and backlash. After the
-    calibration, the board sends its ticks with the same period as before.
+    The robot has encoder marks that are 10 % off, unequal wheels, dead time and backlash.
+    Afterwards, the tick period is as before.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
