@@ -70,9 +70,9 @@ class Robot:
         self._executor.add_node(node)
 
     def close(self) -> None:
-        """End the connection to ROS.
+        """End the executor and the connection to ROS.
 
-        The executor must end too. Otherwise it would report errors when the program ends.
+        An executor that is still active would report errors when the program ends.
         """
         self._executor.shutdown(timeout_sec=0.0)
         rclpy.try_shutdown()

@@ -50,7 +50,7 @@ def explain(url: str, parameter: str, error: Exception) -> str:
     """Return a sentence that says why this port cannot be opened, and what to do."""
     code = error.errno if isinstance(error, OSError) else None
     if isinstance(error, ValueError) and "baud rate" in str(error):
-        return f"{url} cannot be set to this speed: {error}; check the parameter `baudrate`"
+        return f"{url} does not accept the baud rate: {error}; check the parameter `baudrate`"
     if "remote rejected" in str(error):  # the words of pyserial for rfc2217://
         return (
             f"cannot open {url}: the server does not accept a setting ({error}); check the"

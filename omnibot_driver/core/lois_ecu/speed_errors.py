@@ -28,7 +28,7 @@ EXCESS_CHANGE: Final = (0.0, 0.15)
 * ``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess.
 * ``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
 
-The first value is for the board's own controller gains, the second for the user's gains.
+Of each pair, the first value is for the board's own controller gains, the second for the user's.
 """
 DUTY_STDDEV: Final = 0.3
 

@@ -30,9 +30,10 @@ The decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, pl
 ``RESTARTED_TICKS`` ticks.
 """
 SILENT_S: Final = 1.0
-"""Time in s without tick reports after which counts near zero, and a clock that deviates from the
-fitted clock, prove a restart of the board. After a shorter time, the expected motion must also
-exclude the counts."""
+"""Shortest silence in s after which low counts and a deviating clock prove a restart of the board.
+
+After a shorter silence, a third proof is needed: the expected motion cannot explain the counts.
+"""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0

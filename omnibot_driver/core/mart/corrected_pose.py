@@ -97,9 +97,9 @@ class CorrectedPose:
         self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
 
     def doubt_turn(self, turn_rad: float) -> None:
-        """Increase the uncertainty: an angle ``turn_rad`` may be missing in a measured turn.
+        """Increase the uncertainty of the pose by a turn that was perhaps not measured.
 
-        If one wheel stood still, the robot's centre has moved too.
+        Only one wheel may have turned, so the position becomes uncertain too. ``turn_rad``: angle.
         """
         turn_rad = min(abs(turn_rad), ANY_RAD)
         self.doubt.add((turn_rad * self._settings.track_m / 2) ** 2, turn_rad**2)

@@ -55,7 +55,7 @@ class FailedStarts(Adjusting):
                 self._blocked, self.health.reference_fails = Motion.REFERENCE, 0
                 why = (
                     "check whether the motors are stuck or without power; forward motion is refused"
-                    " until the motion command ends"
+                    " until the command is zero or expires"
                 )
         elif reply.reason == words.NO_START:
             why = self._not_turned()
@@ -77,7 +77,7 @@ class FailedStarts(Adjusting):
         self._blocked, self._no_starts = self.motion, 0
         return (
             "the right wheel has not turned, so check whether it is stuck or without power; this"
-            " motion is refused until the motion command ends"
+            " motion is refused until the command is zero or expires"
         )
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:

@@ -81,8 +81,8 @@ FILES_BEGIN: Final = {
 }
 """What the user must do to get a file of the last move or turn, if the controller has none."""
 UNPROVED: Final = (
-    "the order of its pieces is not proved: compare it with the file on the controller, before"
-    " ~/start_log deletes that file"
+    "the pieces of this file may be in a wrong order: compare it with the controller's own file,"
+    " before ~/start_log deletes that"
 )
 
 

@@ -64,10 +64,10 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """Return the possible errors of the motion that is predicted since the last encoder count.
+        """Return the possible errors of the motion predicted since the last encoder count.
 
-        ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the current
-        controlled move, or None.
+        ``ahead_s``: time since this count, in s. ``blind_since_s``: start time of a controlled
+        move, in which the server reports no measurements; None if there is no such move.
         """
         if blind_since_s is not None:
             blind_s = max(0.0, now - blind_since_s)

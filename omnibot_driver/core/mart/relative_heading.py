@@ -102,8 +102,8 @@ class RelativeHeading:
     def tell(self, angle_rad: float, when: Moment, stood_s: float, scale: float = 1.0) -> bool:
         """Process a reported heading; return whether it is plausible and has changed.
 
-        ``stood_s``: time at which the robot was stopped, or infinity. ``scale``: true turn to the
-        left divided by the change of the reported heading.
+        ``stood_s``: time at which the last motion ended; infinity during a motion. ``scale``: true
+        turn to the left divided by the change of the reported heading.
         """
         if not abs(angle_rad) < MOST_RAD:
             self.forget()

@@ -212,10 +212,10 @@ class SpeedLoop(Motors):
             self._clear(now)
 
     def _judge_missed(self, *, right_only: bool) -> None:
-        """Undo the unanswered changes of the units that have probably not arrived at the server.
+        """Decide which requests to change the motors' units were lost, and undo them.
 
-        The driver assumes the combination of arrived and lost changes that fits the measured speeds
-        best.
+        The server has not answered these requests. The driver chooses the lost ones so that the
+        motors' units fit the measured speeds best.
         """
         seconds, per_unit_mps = self._window_s, self.per_unit_mps
 

@@ -258,7 +258,7 @@ class Stops(StopReasons, ABC):
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"
             self._notice(
-                f"obstacle {where} ({why}); this direction is refused until the motion command"
-                " ends",
+                f"obstacle {where} ({why}); this direction is refused until the command is"
+                " zero or expires",
                 halt=False,
             )

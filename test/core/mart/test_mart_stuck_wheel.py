@@ -69,7 +69,7 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
     bench.server.chassis.change(stuck="right")
     bench.command(vx, yaw_rate, 10.0)
     assert sum("start timedout" in notice for notice in bench.notices) == 3
-    assert "refused until the motion command ends" in bench.notices[-1]
+    assert "refused until the command is zero or expires" in bench.notices[-1]
     assert abs(bench.truth.yaw_rad) < math.radians(90.0)
     assert nees(bench) < MOST_NEES
     bench.command(0.0, 0.0, 3.0)

@@ -83,9 +83,9 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """A late read gives a lower bound that contradicts the upper bounds of a tick's time.
+    """A late read makes a lower bound of the fitted clock later than the upper bounds.
 
-    The clock discards this lower bound, because an upper bound is always right.
+    The clock discards the lower bound, because upper bounds are always right.
     """
     _, late_s = followed(
         0.0,
