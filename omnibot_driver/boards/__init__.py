@@ -93,10 +93,10 @@ def table_for(given: Mapping[str, object]) -> Table:
 
 
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
-    """Return the values of all parameters of the board that ``given`` names.
+    """Return the values of all parameters of the board ``given["board"]``.
 
-    Missing parameters have their default values. Raises ParameterError for a wrong value or an
-    unknown parameter.
+    Parameters that are not in ``given`` have their default values. Raises ParameterError for a
+    wrong value or an unknown parameter.
     """
     table = table_for(given)
     for name in given:

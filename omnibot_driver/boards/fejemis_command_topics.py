@@ -145,8 +145,8 @@ class FejemisCommands:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return an empty string, the reason for a refusal, or a warning.
 
-        ``off``: whether ``action`` switches a device off, which only a replay refuses. The warning
-        says that this device may still be on.
+        ``off``: whether ``action`` switches a device off. Only a replay refuses this. If a port is
+        closed, the warning says that the device may still be on.
         """
 
         def say(session: Session, now: float) -> str:

@@ -28,8 +28,8 @@ class Notice:
 class Extra:
     """A measurement that only one kind of board makes; its profile publishes it.
 
-    ``stamp_s``: time of measurement, in s of the host's steady clock. A RequestDone or Unstamped is
-    published without a stamp.
+    ``stamp_s``: time of measurement, in s of the host's steady clock. If ``value`` is
+    a RequestDone or Unstamped, it is published without a stamp.
     """
 
     value: object

@@ -20,9 +20,9 @@ MOST_OWED: Final = 0.5
 """Largest rounding error, in degrees, that is carried over to the next angle."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit, in degrees, for the angle to the left that the board may read by mistake.
+"""Limit, in degrees, for the false angle to the left that results from a lost minus sign.
 
-The mistake is an unnoticed loss of the minus sign of an angle to the right.
+Angles to the right have a minus sign, whose loss the checksum may not detect.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

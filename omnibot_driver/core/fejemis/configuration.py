@@ -206,7 +206,7 @@ def _near(
 ) -> bool:
     """Return whether the board's numbers equal the wanted ones, except for rounding.
 
-    ``digits``: for each number, the unit of the last digit that the board prints; empty if unknown.
+    ``digits``: for each number, the value of one step of its last digit; empty if unknown.
     """
     exact = digits or (math.inf,) * len(wanted)
     return len(told) >= len(wanted) and all(

@@ -16,10 +16,10 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Limit for the time between the arrivals of two successive samples, in sampling periods.
+"""Limit, in sampling periods, for the time between the arrivals of two late samples.
 
-If both samples seem late, a longer time means that an earlier sample was lost, a shorter time that
-the host has stalled.
+Above this limit, a sample was lost before them. Below this limit, they are late because the host
+has stalled.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""

@@ -39,23 +39,23 @@ The kernel's buffer may have overflowed. The next pose shows whether lines are m
 """
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``, ``SUREST_S``: limits, in s, for the magnitude of ``_evidence_s``.
+"""``KNOWN_S``, ``SUREST_S``: limits, in s, for the evidence which line of a sample comes first.
 
-From ``KNOWN_S`` on, the sign shows which line of a sample comes first. The magnitude never exceeds
+From a magnitude of ``KNOWN_S`` on, the sign of the evidence decides. The magnitude never exceeds
 ``SUREST_S``.
 """
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to the interval between a gyro and an acceleration line if another line
-arrives between these two. They then probably belong to different samples.
+"""Time in s that is added to the interval between a gyro and an acceleration line with another
+line between them. These two lines probably belong to different samples.
 """
 PATIENCE: Final = 60
-"""Limit for the number of measured intervals between a gyro line and an acceleration line.
+"""Number of measured intervals after which the driver decides which line of a sample comes first.
 
-At this limit, ``ImuPairs`` decides which line of a sample comes first, even if the magnitude of
-``_evidence_s`` is still below ``KNOWN_S``.
+The intervals are between a gyro line and an acceleration line. The driver decides earlier if the
+magnitude of the evidence reaches ``KNOWN_S``.
 """
 MOST: Final = 10
-"""Limit for the magnitude of each counter in ``_outside``. At this limit, a counter stops."""
+"""Largest magnitude of the counters which show whether a kind of line comes within IMU pairs."""
 UNPOSED: Final = 20
 """Limit for the number of gyro lines, and of acceleration lines, since the last pose.
 
@@ -255,7 +255,7 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Count where lines come: between two pairs, or within a pair.
+        """Change the counters which show whether a kind of line comes within IMU pairs.
 
         ``kinds``: kinds of lines that have come. ``step``: 1 if the lines came between two pairs,
         -1 if within a pair.

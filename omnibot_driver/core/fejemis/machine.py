@@ -29,7 +29,7 @@ LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
 """Smallest voltage that is sent to the lift, as a fraction of the commanded voltage.
 
-In some voltages, the checksum cannot detect all damage. The driver then sends a lower voltage.
+The driver sends a lower voltage if the checksum cannot detect all damage to the number.
 """
 LEAST_TIME_S: Final = 0.04
 
@@ -160,8 +160,8 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    In some voltages, the checksum cannot detect all damage. The line then contains a lower voltage,
-    but at least ``LEAST_PART * volts``.
+    If the checksum cannot detect all damage to the number, the line contains a lower voltage, but
+    at least ``LEAST_PART * volts``.
     """
     if not volts:
         return OFF[0], 0.0

@@ -126,7 +126,7 @@ class Infrared:
 class WheelConfiguration:
     """``conf``: wheel radii, gear, encoder ticks per revolution, track, and control period.
 
-    ``digits``: for each number, the unit of its last digit in the line; empty if unknown.
+    ``digits``: for each number, the value of one step of its last digit; empty if unknown.
     """
 
     left_radius_m: float
@@ -158,7 +158,7 @@ class SteeringConfiguration:
 
     * ``first_m``, ``second_m``: the numbers in the line's order; on some boards, the track is
       first.
-    * ``digits``: unit of each number's last digit; empty if unknown.
+    * ``digits``: for each number, the value of one step of its last digit; empty if unknown.
     """
 
     first_m: float

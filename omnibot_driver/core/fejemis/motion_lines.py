@@ -20,7 +20,7 @@ LEAST_MPS: Final = 0.001
 SLOWEST_MPS: Final = 2e-4
 """Limit for the speed in a curve, in m/s. Below this limit, the front board gets the speed 0.
 
-Among smaller speeds, there is hardly any whose text stays harmless if the line is damaged.
+The texts of nearly all smaller speeds can become harmful if the line is damaged.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
@@ -30,9 +30,9 @@ ANGLE_COST: Final = 1e4
 factor of 2.7 (e) costs 1.
 """
 SLOWEST: Final = 30.0
-"""Largest ratio of the outer wheel's speed to the linear speed in the drive board's line.
+"""The drive board gets the linear speed 0, or at least the outer wheel's speed / ``SLOWEST``.
 
-The linear speed may also be 0, except for backward motion, which needs the minus sign.
+For backward motion, the linear speed is never 0, because 0 has no minus sign.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
@@ -76,8 +76,8 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line for a speed in m/s and a turn rate in rad/s.
 
-    By the board's formula, the outer wheel's speed in m/s is sqrt(speed² + turn rate²), with the
-    sign of ``speed_mps``.
+    The board ignores the units: the outer wheel runs at sqrt(``speed_mps``² + ``turn_radps``²)
+    in m/s, with the sign of ``speed_mps``.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
@@ -125,10 +125,10 @@ def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the line with the lowest cost among the lines whose checksum reveals damage.
+    """Return the line nearest to the command among the lines whose checksum reveals damage.
 
-    If there is no such line, return the line with the lowest cost. ``signs``: signs of speed and
-    turn rate, as text.
+    If there is no such line, return the nearest of all lines. ``signs``: signs of speed and turn
+    rate, as text.
     """
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)

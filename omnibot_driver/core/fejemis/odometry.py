@@ -47,18 +47,18 @@ Each of these poses must agree with the rejected pose just before it.
 MOVED_FRAME: Final = 2
 """Number of rejected poses in a row that prove a new coordinate frame if the wheel speeds agree.
 
-The wheel speeds must explain the motion to each of these poses from the rejected pose before it.
+The motion from each rejected pose to the next must agree with the wheel speeds.
 """
 AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012
-"""``AGAIN_M``, ``AGAIN_RAD``: tolerances, in m and rad, between poses and the wheels' motion.
+"""``AGAIN_M``, ``AGAIN_RAD``: tolerances (m, rad) when poses are compared with the wheels' motion.
 
-With them, the driver detects that the board has set its pose to zero between two rejected poses.
+The comparison shows whether the board has set its pose to zero between two rejected poses.
 """
 LONGEST_JUMP_S: Final = 0.2
 """Longest time after an accepted pose, in s, in which the wheel speeds overrule the poses.
 
-Another program may repeatedly set the pose to zero (``enc0``).
+In this time, another program may set the pose to zero (``enc0``) more than once.
 """
 
 
@@ -95,8 +95,7 @@ class PoseOdometry:
         self._driven: Pose | None = None
         """Motion from the last accepted pose to the last rejected pose; None while it is unknown.
 
-        The motion is known only while the wheel speeds contradict the rejected poses, which may be
-        in a new coordinate frame.
+        The wheel speeds show this motion, even if the board has begun a new coordinate frame.
         """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
@@ -129,8 +128,8 @@ class PoseOdometry:
     def readings(self, pose: BoardPose) -> list[DisplacementReading | PoseReading]:
         """Return a list with the displacement from the previous pose; empty without a displacement.
 
-        Every 0.2 s, and at the start of a coordinate frame, a PoseReading follows: the frame's
-        first pose plus all returned displacements.
+        Every 0.2 s, and when the board begins a coordinate frame, a PoseReading follows: the
+        frame's first pose plus all returned displacements.
         """
         displacement = self.pose(pose)
         if displacement is None:

@@ -61,8 +61,8 @@ def lines(*texts: bytes, sums: bool) -> bytes:
 def robust(text: bytes) -> bool:
     """Return whether the checksum of ``text`` detects each critical loss of two characters.
 
-    A critical loss is that of a line end or a checksum digit together with ``;`` or a part of a
-    number.
+    In a critical loss, one character is a line end or a checksum digit, and the other is ``;`` or
+    a part of a number.
     """
     # A lost line end joins two lines. Let S be the sum of the second line with its prefix ``;NN``.
     # The board accepts the joined line if a character with the code S is lost too. So S must not be

@@ -149,8 +149,8 @@ class TeensyClock:
     def _began_late(self, board_s: float, now: float) -> bool:
         """Begin the clock anew if the clock began with a line that arrived late.
 
-        Return whether the clock has begun anew. Three (``AGAIN``) early lines with board times that
-        agree are necessary.
+        The proof is three (``AGAIN``) lines that are too early by this clock and whose board times
+        agree. Return whether the clock has begun anew.
         """
         agree = all(
             before_s < board_s
@@ -184,10 +184,7 @@ class StampedReadings:
         self.begin()
 
     def begin(self) -> None:
-        """Discard the readings of the previous call of the board, because a new call begins.
-
-        A call of the board is a call of ``FejemisBoard.receive``, ``flush`` or ``elapse``.
-        """
+        """Discard the readings when ``FejemisBoard.receive``, ``flush`` or ``elapse`` begins."""
         self.readings: list[Reading] = []
         self._stamps: list[float] = []
 

@@ -2,8 +2,8 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-The driver gets each notice that stops the robot, with an empty text if the user has seen the text
-in the last 10 s.
+A notice that makes the driver stop the robot is never left out. Its text is empty if the user has
+seen the text in the last 10 s.
 """
 
 import math

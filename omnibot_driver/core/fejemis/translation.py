@@ -149,9 +149,10 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add waiting IMU samples and orientations to the readings until a sample is doubtful.
+        """Add waiting IMU samples and orientations to the readings, in order of arrival.
 
-        Call this method after a pose and at the end of a read.
+        Stop at a sample that must wait for the next pose. Call this method after a pose and at the
+        end of a read.
         """
         for item in self._pairs.take():
             if isinstance(item, Pair):

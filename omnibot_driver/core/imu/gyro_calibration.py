@@ -2,7 +2,7 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-Without displacements, a steady turn looks like rest, so a large bias is always rejected.
+If no displacements are reported, a steady turn looks like rest, so a large bias is always rejected.
 """
 
 import math
@@ -21,8 +21,8 @@ The observation for a requested measurement lasts ``MEASURE_S``.
 GAP_S: Final = 0.2
 """Longest allowed time between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
-"""Time in s within which a request is answered. ``~/calibrate_gyro`` may take five seconds, so one
-second is left to write a file.
+"""Time in s within which a request is answered. ``~/calibrate_gyro`` may take five seconds; the
+last second is for writing a file.
 """
 
 STILL_RADPS: Final = 0.01

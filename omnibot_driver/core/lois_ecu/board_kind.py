@@ -14,10 +14,7 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports after which the driver can recognise a board of the manual's kind.
-
-The sign of such a board is an odometry report with the command byte 0x20.
-"""
+"""Number of tick reports after which an odometry report 0x20 shows a board of the manual's kind."""
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
 count decreases, the driver decides that the board does not count ticks backward."""
@@ -48,8 +45,8 @@ class BoardKind:
     def took_odometry(self, *, appended: bool) -> None:
         """Record an odometry report.
 
-        ``appended``: whether it has the command byte of a tick report (0x12, public firmware), not
-        its own (0x20).
+        ``appended``: whether the report was appended to a tick report, with the command byte 0x12
+        (public firmware). Otherwise, the command byte is 0x20.
         """
         motion = self._motion
         if appended and not self.appends:

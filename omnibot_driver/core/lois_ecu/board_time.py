@@ -2,8 +2,8 @@
 
 """Estimation of the delay with which each tick report was read.
 
-The arrival time is compared with the board's clock, which always runs (manual), or stops while the
-board sends (public firmware).
+The arrival time is compared with the board's clock. By the manual, this clock always runs; in the
+public firmware, it stops while the board sends.
 """
 
 import math

@@ -30,7 +30,7 @@ class Coasting:
     speed_mps: float
 
     def unsure_mps(self, now: float, step_s: float) -> float:
-        """Return the speed's standard deviation at ``now``, in m/s, with the sign of the speed.
+        """Return the speed's standard deviation at ``now``, in m/s; negative for a negative speed.
 
         ``step_s``: period of the speed controller in s, by which the deceleration may be delayed.
         """

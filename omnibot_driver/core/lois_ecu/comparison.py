@@ -60,8 +60,8 @@ LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP`` (standard deviations), ``LEAP_M`` (m): limits for deviations of the board's odometry.
 
-A heading, as a difference of the two wheels' distances, is ignored above both limits; a distance is
-ignored above ``LEAP``.
+A distance is ignored above ``LEAP``. A heading is ignored above both limits; in m, a heading is the
+difference of the two wheels' distances.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -77,14 +77,13 @@ These errors occur only at an oscillating speed, and without counted ticks.
 LOST_PART: Final = (0.15, 0.35)
 """Standard deviation of a distance rolled while reports were lost, as a fraction of this distance.
 
-The values are for a steady and for an oscillating speed, of a wheel without counted ticks.
+The values are for a wheel without counted ticks, at a steady and at an oscillating speed.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""Standard deviation of a wheel's distance after a correction, as a fraction of the excess.
+"""Standard deviation of a wheel's distance, as a fraction of its correction beyond a limit.
 
-The excess is the correction above ``CORRECTED_TICKS`` (in ticks). Only wheels without counted ticks
-have this error.
+The limit is ``CORRECTED_TICKS`` (in ticks). Only wheels without counted ticks have this error.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance
@@ -246,7 +245,7 @@ class Comparison:
     def _equal(self, told: Told, shown: tuple[float, float]) -> bool:
         """Return whether both wheels have the same speed.
 
-        In this case, the board's odometry shows the speed zero for both wheels.
+        In this case, the board's odometry shows the speed zero, although both wheels turn.
         ``shown``: for each wheel, the estimate of its last measured speed, in m/s.
         """
         left, right = (wheel.course.measured_sign for wheel in self._motion.wheels)

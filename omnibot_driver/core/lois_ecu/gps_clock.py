@@ -38,8 +38,8 @@ class GpsClock:
     def set_date(self, date: GpsDate, now: float) -> None:
         """Use a date that arrived at ``now``.
 
-        If the calendar has no such date, or it is from 2038 on, the date becomes unknown: without a
-        date, the receiver sends zeros or a false year.
+        The date becomes unknown if it is from 2038 on, or not in the calendar. A receiver that does
+        not know the date sends zeros or a false year.
         """
         self.dated = _exists(date) and date.year < UNKNOWN_FROM_YEAR
         self._date = date if self.dated else None

@@ -111,8 +111,7 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        The board's clock alone does not show a restart, because a clock in ns also wraps every 4.3
-        s.
+        The tick counts decide, because a clock in ns jumps back every 4.3 s without a restart.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

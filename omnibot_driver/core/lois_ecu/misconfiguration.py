@@ -27,7 +27,7 @@ OWN_GAINS: Final = (
 )
 """Advice if the user has not set all gains; the braces stand for the names of the missing gains.
 
-The odometry errors were measured in 150 forward drives with a build of the public firmware.
+The errors in the text were measured in 150 forward drives with a build of the public firmware.
 """
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (
@@ -44,7 +44,7 @@ NO_TICKS_ADVICE: Final = (
 )
 """Advice if other reports came for ``NO_TICKS_S`` (in s), but no ticks.
 
-A longer time than ``LONGEST_STEP_S`` (in s) between two reports is counted as ``LONGEST_STEP_S``.
+In this time, each interval between two reports counts as at most ``LONGEST_STEP_S`` (in s).
 """
 LOOK_AT: Final = 600
 """Number of received bytes without a valid line after which the user gets advice. The board sends

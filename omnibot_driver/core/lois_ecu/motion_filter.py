@@ -2,8 +2,8 @@
 
 """Kalman filter of both wheels' motion, and of the values that the board reports.
 
-Both wheels have the radius in the settings. The left and the right wheel are the board's, not the
-robot's.
+Both wheels have the radius in the settings. The left wheel is the board's left wheel, which
+is the robot's right wheel if the board is inverted.
 """
 
 import math
@@ -77,7 +77,7 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest estimated difference (m/s) of both measured speeds since the last comparison.
+        """Smallest estimated difference (m/s) of measured wheel speeds since the last comparison.
 
         At equal speeds, the public firmware does not update its position, so the board's distance
         may be too short.

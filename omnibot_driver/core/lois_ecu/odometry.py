@@ -54,8 +54,8 @@ class LoisOdometry:
         self._estimated = False
         """Whether an estimate has been made since the odometry's time last advanced.
 
-        If so, the next advance resets the wheels' ``blind`` flags. An odometry report in the same
-        read may still need these flags.
+        If so, the next advance resets each wheel's flag ``blind`` (motion without counted ticks).
+        An odometry report in the same read may still need this flag.
         """
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
@@ -147,7 +147,7 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether a restart of the board is the only explanation for counts near zero.
 
-        For a robot at rest, counts above ``NUDGED_TURNS`` do not show a restart. ``late_s``: how
+        For a robot at rest, a push may also explain counts above ``NUDGED_TURNS``. ``late_s``: how
         much later than usual the ticks arrived.
         """
         found, per_turn = self._unforeseen(ticks, now, late_s), self._settings.ticks_per_revolution
@@ -252,8 +252,8 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process an odometry report. It corrects the predictions and estimates that follow.
 
-        The message is 0x20 (manual) or 0x12 (public firmware). ``late_s``: how much later than
-        usual the report arrived, in s.
+        The command byte is 0x20 (manual), or 0x12 as for ticks (public firmware). ``late_s``: how
+        much later than usual the report arrived, in s.
         """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now
