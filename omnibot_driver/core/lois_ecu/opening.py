@@ -61,13 +61,12 @@ TICKS_DUE_S: Final = 1.5
 period of the tick reports, it writes the period again only after a tick report or this wait."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
-"""Time in s without an answer after which the driver restores the board's mode. It is longer than a
-boot, which takes two seconds."""
+"""Time in s without an answer after which the driver restores the board's normal mode. The time is
+longer than a boot (2 s)."""
 UNANSWERED_S: Final = 5.0
-"""Time in s without the requested GPS date after which the driver restores the board's mode.
+"""Time in s without the requested GPS date after which the driver restores the normal mode.
 
-Such a board may obey no requests, and may send no tick reports, which a new round of settings
-needs.
+Such a board may ignore requests and send no tick reports.
 """
 RESYNC: Final = b"::"
 """Two extra colons between a line with a checksum and a line without.
@@ -322,7 +321,7 @@ class SettingsWriter:
         )
 
     def recovery(self) -> bytes:
-        """Return the lines that restore the mode of a board that is silent or does not obey.
+        """Return the lines that restore the normal mode of a board that is silent or does not obey.
 
         The last lines are Stops, so the caller must not call this method while motion is commanded.
         """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The lines that make the robot move and stop. The board can lose characters and complete lines."""
+"""The lines that make the robot move and stop. The board can lose characters and whole lines."""
 
 from typing import Final
 

@@ -38,9 +38,9 @@ Over a shorter time, the errors of the arrival times are too large."""
 ROLLED_OUT_TURNS: Final = 0.15
 ROLLED_OUT_TICKS: Final = 1
 STARTING_TURNS_PER_S: Final = 1 / 3
-"""Terms of the largest plausible count of a wheel, ``age`` s after a restart of the board:
-``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * age`` turns, plus ``ROLLED_OUT_TICKS`` ticks. The count
-starts at zero."""
+"""Terms of a limit for a wheel's count, which starts at zero. At ``age`` s after a restart of the
+board, the count is at most ``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * age`` turns, plus
+``ROLLED_OUT_TICKS`` ticks."""
 
 ClockUnit = Literal["ms", "ns"]
 

@@ -85,8 +85,9 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return ``found`` with the result of the request, if known, and without other records.
 
-        While a record arrives, an empty list becomes a RecordComes. ``prevented``: why the board
-        cannot send the record, as a sentence; empty if it can.
+        While lines of a record arrive, return a RecordComes instead of an empty list.
+
+        ``prevented``: why the board cannot send the record, as a sentence; empty if it can.
         """
         comes: list[LoisReading] = [RecordComes()] if decoder.in_record else []
         if self.kind is None:

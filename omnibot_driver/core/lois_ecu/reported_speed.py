@@ -2,7 +2,8 @@
 
 """Corrections of one wheel's estimated motion by the speeds that a LOIS ECU reports for the wheel.
 
-The board repeats the last speed of a wheel at rest, and measures wrong speeds while it sends.
+The board keeps reporting the last speed of a stopped wheel, and measures wrong speeds while it
+sends.
 
 This module knows reported speeds and the motion filter; it does not know messages.
 """

@@ -13,8 +13,8 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the speed that the board reports for a wheel at
-rest. A wheel with a lower reported speed is starting; a wheel with a higher one still rolls."""
+"""``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the speed that the board keeps reporting for a
+stopped wheel. A wheel with another reported speed still rolls, or is just starting."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -25,12 +25,11 @@ LOST_S: Final = 0.25
 """Limit for the mean time in s between the last ``LOST_REPORTS`` reports. If the mean time is above
 the limit, reports are lost, or the board rarely sends reports."""
 REPORT_S: Final = 0.2
-"""Longest usual time in s between two reports. While reports are lost, this module's clock advances
-by at most ``REPORT_S`` for each report that arrives, so that earlier speeds are not forgotten too
-soon."""
+"""Longest usual time in s between two reports. While reports are lost, each report ages the stored
+speeds by at most ``REPORT_S``, so that they are not forgotten too soon."""
 HIDDEN_PART: Final = 0.3
-"""Rate of this module's clock, as a fraction of real time, while the board does not report the
-wheel's speed. A slower clock keeps earlier speeds for longer."""
+"""Rate at which the stored speeds age while the board does not report the wheel's speed, as a
+fraction of real time. Slower ageing keeps the speeds for longer."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -66,8 +65,7 @@ class RestingWheel:
         self._gaps = False
         """Whether reports were being lost when the reported speed last changed.
 
-        If the user has set the controller's gains, the value is always False, so that ``GAPS`` is
-        not used.
+        The value is always False if the user has set the controller's gains.
         """
         self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0

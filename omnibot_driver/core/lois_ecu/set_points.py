@@ -18,10 +18,10 @@ from omnibot_driver.core.lois_ecu.settings import BOOT_PERIOD_MS, LoisEcuSetting
 
 CLEAR_AFTER_S: Final = 2.0
 """Shortest time in s from a Stop until RPM 0/0 is sent. RPM 0/0 clears the firmware's measured
-speed, but ends the counting of ticks, which must show the standstill first."""
+speed, but ends the counting of ticks. So the ticks must show the standstill first."""
 CLEAR_AFTER_TICKS: Final = 6
 """Shortest time from a Stop until RPM 0/0 is sent, in periods of the tick reports. RPM 0/0 clears
-the firmware's measured speed, but ends the counting of ticks, which must show the standstill
+the firmware's measured speed, but ends the counting of ticks. So the ticks must show the standstill
 first."""
 CLEAR_AGAIN_S: Final = 0.15
 
@@ -31,7 +31,7 @@ class SetPoints:
 
     * ``saturated``: number of commands that were slowed, because a value was above its limit.
     * ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
-      none was sent. To repeat RPM 0/0, ``clears`` sets a later time.
+      none was sent. The method ``clears`` changes this time to plan the next RPM 0/0.
     * ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
     * ``moved_at_s``: time of the last motion command.
     * ``said_at_s``: time of the last set-point, also of a zero one.

@@ -30,9 +30,9 @@ BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 
 
 def slow_ticks(settings: LoisEcuSettings) -> bool:
-    """Return whether the tick reports' period is too long to be written in each settings round.
+    """Return whether the period of the tick reports is longer than ``FAST_TICKS_MS``.
 
-    Each write restarts the period on the board, and so delays the next tick report.
+    Not every settings round writes such a period, because each write delays the next tick report.
     """
     return settings.periods_ms.get(Stream.TICKS, 0) > FAST_TICKS_MS
 

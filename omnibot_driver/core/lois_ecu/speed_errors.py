@@ -48,8 +48,8 @@ class SpeedErrors:
     def restored(self) -> None:
         """Record that the filter has gone back to an earlier state.
 
-        That state may contain the errors of RPM set-points. So if a wheel follows a duty command,
-        the next ``follow`` resets the errors of both wheels.
+        If a wheel follows a duty command, the next ``follow`` resets the errors of both wheels. The
+        errors in the earlier state may be those of RPM set-points.
         """
         if self._kinds and "duty" in self._kinds:
             self._kinds = None
@@ -57,8 +57,8 @@ class SpeedErrors:
     def follow(self) -> None:
         """Reset the bias of each wheel whose kind of command has changed.
 
-        A change also resets the excess of both wheels. A Stop after a duty command changes neither
-        the kind nor the speed's error.
+        A change also resets both wheels' excess, the relative error of a backward speed. A Stop
+        after a duty command changes neither the kind nor the speed's error.
         """
         before = self._kinds or ("", "")
         left, right = [

@@ -30,8 +30,8 @@ TOO_FAST_RPM: Final = 3
 """A repeated speed is outdated, and the wheel is at rest, if the speed is more than ``TOO_FAST``
 times the set-point, and more than ``TOO_FAST_RPM`` RPM above it."""
 UNLIKE: Final = 1.15
-"""Largest usual ratio between the *relative speeds* (speed divided by set-point) of two wheels that
-roll backward. Up to this ratio, a wheel's speed is not regarded as too high."""
+"""Largest plausible ratio of the *relative speeds* (speed divided by set-point) of two wheels that
+roll backward. A larger ratio can show that a reported speed is outdated."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
@@ -43,8 +43,8 @@ wheel."""
 class StallWatch:
     """Detector of stalled wheels. ``stalled`` reports a stalled wheel once in each ``STALLED_S``.
 
-    ``may_roll``: for each wheel, whether it may roll although it seems stalled. The board then
-    repeats a speed too high for a wheel at rest.
+    ``may_roll``: for each wheel, whether it may roll although it seems stalled, because the board
+    repeats a speed that is too high for a wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -82,7 +82,7 @@ class StallWatch:
     ) -> None:
         """Process a report: ticks, or the board's odometry.
 
-        The driver sees forward motion in the ticks, and backward motion in the board's odometry.
+        Ticks show forward motion. The board's odometry shows backward motion.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """

@@ -23,8 +23,8 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    ``want`` requests a mode; ``stop_first`` announces the change of a parameter. Both may be called
-    at any time.
+    ``want`` requests a mode. ``stop_first`` stops the robot for the change of a parameter. Both
+    methods may be called at any time.
     """
 
     def __init__(self) -> None:

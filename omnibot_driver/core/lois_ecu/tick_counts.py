@@ -37,9 +37,8 @@ After a shorter silence, a third proof is needed: the expected motion cannot exp
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s in which wheels are assumed to roll back between two tick reports. The limit
-applies only if the unit of the board's clock was known before the second report, and is unknown
-after it."""
+"""Longest time in s for which wheels are assumed to have rolled back before a tick report that
+contradicts the known unit of the board's clock."""
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset. The time begins with the
 first counts that arrive after the driver has sent the reset."""

@@ -46,9 +46,8 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Factors in s for a wheel that halts soon after a new set-point: standard deviation of its
-distance in m, divided by ``unsettled_mps``. The first is for the board's gains, the second for the
-user's."""
+"""Standard deviation of the distance of a wheel that halts soon after a new set-point, in m per m/s
+of ``unsettled_mps``. The first value is for the board's gains, the second for the user's."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -169,7 +168,7 @@ class Wheel:
         """Predict the motion of the wheel in one step of the filter, and store it in ``step``.
 
         ``holds``: whether the board keeps the last measured speed of a wheel at rest. ``signed``:
-        see ``counts``.
+        whether the tick count decreases when the wheel rolls backward.
         """
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]

@@ -30,7 +30,7 @@ APART_S: Final = 0.4
 
 
 class Asking(Stops):
-    """The part of the pilot that finds out which motion is in progress."""
+    """The part of ``Pilot`` that finds out which motion is in progress."""
 
     def _ask_what_moves(self, now: float) -> None:
         self._stopping = None

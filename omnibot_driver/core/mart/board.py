@@ -155,8 +155,8 @@ class MartBoard(Board):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that are due even if no datagram arrives.
 
-        Examples are odometry, and the result of a job. While the server is expected to be silent,
-        NOTHING_MEASURED is due every ``EXPECTED_EVERY_S``.
+        Examples are odometry, and the result of a job. While a busy server is expected to be
+        silent, NOTHING_MEASURED every ``EXPECTED_EVERY_S`` shows that the server is alive.
         """
         readings = self._pilot.take()
         pilot = self._pilot
@@ -225,7 +225,7 @@ class MartBoard(Board):
         """Begin a job; a JobDone with this ``token`` reports its result later.
 
         Raises RequestRefused if another job is in progress, or if ``job`` is the download of a log
-        that the server may not have.
+        that may not exist.
         """
         self._pilot.jobs.ask(job, token, now, *arguments)
 

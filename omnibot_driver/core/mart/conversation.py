@@ -218,10 +218,10 @@ class Conversation(LateReplies):
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether ``reply`` is taken for a copy of the reply to another command.
+        """Return whether ``reply`` seems to be a copy of the reply to another command.
 
-        ``word``: the command that is pending. An equal reply must just have come to another query
-        or to a controlled move.
+        True if the pending command, ``word``, is a query whose last reply differs from ``reply``,
+        and an equal reply has just come to another query or to a controlled move.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

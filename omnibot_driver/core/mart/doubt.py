@@ -192,7 +192,7 @@ def _by_gyro(told_rad: float) -> float:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return independent errors of x, y and heading, each with its variance and direction.
+    """Return independent errors of x, y and heading, each as a variance and a unit vector.
 
     ``way_m``, ``turn_rad``: standard deviations of x and of y (m), and of the heading (rad).
     """

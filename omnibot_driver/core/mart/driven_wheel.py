@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One motor with the wheel that it turns: its units, and what an averaging window shows about it.
+"""One motor and the wheel that it turns: motor units, and measurements in an averaging window.
 
 This module knows units, metres and seconds; it does not know the other motor, or what is commanded.
 """

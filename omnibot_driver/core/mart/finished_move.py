@@ -155,7 +155,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply answers another request. A stop after such a reply has ended the first run, not
-        a second one.
+        Such a reply answers another request. A stop after such a reply has ended the move itself,
+        not a duplicate of the move.
         """
         return self.lasted_s < FULL * self.usual_s

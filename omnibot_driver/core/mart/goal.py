@@ -45,7 +45,8 @@ NEAR_RAD. This growth keeps the robot from turning back and forth."""
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
 
-After a straight move that takes too long, the moves are counted from zero again (``Move.cut``).
+A straight move that takes too long sets the count of moves to zero (``Move.cut``): a distant goal
+needs several straight moves.
 """
 
 

@@ -57,16 +57,15 @@ NO_HEADING: Final = (
     " the odometry is uncertain: check the network and the server"
 )
 PRESENT_S: Final = 0.35
-"""Constant term, in s, of a limit for a silence of the server.
+"""Longest silence in s in which the server cannot have been restarted.
 
-The limit is PRESENT_S plus ABSENT_TRIPS times the average duration of a query. In a shorter
-silence, the server cannot have been restarted.
+ABSENT_TRIPS times the average duration of a query is added to this time.
 """
 GAP_S, GAP_LONGEST_S = 0.12, 1.0
 """Times in s to detect a restart of the server by a short silence while the robot is at rest.
 
-* ``GAP_S``: silence, besides twice the average duration of a query, after which the driver reads
-  the heading. A heading of exactly zero shows a restart.
+* ``GAP_S``: silence after which the driver reads the heading. Twice the average duration of a query
+  is added. A heading of exactly zero shows a restart.
 * ``GAP_LONGEST_S``: longest wait for this heading, from the end of the silence.
 """
 ABSENT_BUSY_S: Final = 2.5
@@ -75,8 +74,8 @@ ABSENT_BUSY_S: Final = 2.5
 A stop, for example, keeps the server busy.
 """
 RESTARTED_S: Final = 3.0
-"""Time without a reply, in s, after which the server may have been restarted, so that its stop port
-no longer hangs."""
+"""Time without a reply, in s, after which the server may have been restarted. A restart frees a
+stop port that hangs."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 

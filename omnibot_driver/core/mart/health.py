@@ -148,7 +148,8 @@ class Health:
     def outlives(self) -> None:
         """Record that the server's stop port may still wait for the end of an old motion.
 
-        The server has answered a stop command after the stop port was used for the same motion.
+        The stop port was used to end this motion. The server's answer to a stop command now shows
+        that no restart has freed the port.
         """
         self.outlived, self._may_be_restarted = True, False
 

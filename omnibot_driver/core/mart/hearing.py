@@ -19,8 +19,8 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units that may stay unanswered while the robot's turn is
-computed from the units. After a larger unanswered change, the driver stops the robot."""
+"""Largest relative change of the motors' units that needs no answer while the driver computes the
+robot's turn from the units. After a larger change without an answer, the driver stops the robot."""
 
 
 class Hearing(Measuring):

@@ -144,8 +144,8 @@ class Jobs:
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job, which replaces a job that the driver itself began and has not sent yet.
 
-        Raises RequestRefused if another job is in progress, or for a log that the server may not
-        have.
+        Raises RequestRefused if another job is in progress, or if ``job`` is the download of a log
+        that may not exist.
         """
         if self.job in OWN and not self._waiting:
             self._clear()

@@ -44,10 +44,9 @@ class LateReplies:
         self._answers[word] = reply, now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record a late ``reply`` to an earlier request; the driver expects no other of its form.
+        """Record a late ``reply`` to an earlier request, and stop expecting one of the same form.
 
-        But if an equal reply came within the last ``delay_s``, ``reply`` may be a copy, and nothing
-        changes.
+        Nothing changes if an equal reply came within the last ``delay_s``: ``reply`` may be a copy.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)

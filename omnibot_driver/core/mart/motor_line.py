@@ -75,7 +75,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Lower ``offset`` until the speed at ``units`` is zero, because the motor has not turned.
+        """Lower ``offset`` until the expected speed at ``units`` is zero: the motor has not turned.
 
         An obstacle may be the cause, so ``offset`` becomes as uncertain as at the beginning.
         """
@@ -83,10 +83,9 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Add ``slope`` and ``offset`` to the learned slope and the learned offset.
+        """Add ``slope`` and ``offset`` to the values learned for a motor that was not measured.
 
-        Use this method for a motor that was not measured. The arguments are then the changes of the
-        other motor's line.
+        The arguments are the changes that a measurement made to the other motor's line.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

@@ -23,7 +23,7 @@ MOST_UNEQUAL: Final = 2 * UNEQUAL
 Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Smallest number of motor units for which the ratio of the two motors' speeds is computed. For
-fewer units, the ratio at ``BALANCE_UNITS`` is more exact."""
+fewer units, the driver uses the more exact ratio at ``BALANCE_UNITS``."""
 
 
 class Motors:

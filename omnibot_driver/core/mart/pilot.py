@@ -42,8 +42,8 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
-"""Longest delay of the voltage query (VOLTS) by unanswered requests, in s after the last VOLTS. In
-the first STARTS_UP_S (s) after a motion, the delay may be longer."""
+"""Longest time in s, after the last voltage query (VOLTS), for which unanswered requests delay the
+next one. In the first STARTS_UP_S (s) after a motion, the delay may be longer."""
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
 
@@ -66,8 +66,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Make ``wanted`` the motion, goal or stop that the robot must carry out from now on.
 
-        A command or stop cancels the current job. Only a repetition of the present goal lets the
-        download of a turn's record continue.
+        A command or stop cancels the current job. But if a command repeats the present goal, the
+        driver continues to read the angle of the last turn.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):

@@ -318,10 +318,9 @@ class Reckoning(CorrectedPose):
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return for how many s the turn rate has been out of date, and the resulting error.
+        """Return for how many s the turn rate has been out of date, and the heading's error.
 
-        The error is the heading's standard deviation in rad. Both values are 0 except in a forward
-        drive (RM).
+        The error is a standard deviation in rad. Both values are 0 except in a forward drive (RM).
         """
         stale_s = max(0.0, now - max(self.heading.told_s, self._began_s) - FRESH_S)
         if self.motion is not Motion.REFERENCE:

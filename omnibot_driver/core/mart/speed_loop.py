@@ -22,8 +22,8 @@ The limit is small, because the network may duplicate a command. The server then
 twice.
 """
 MOST_BACKWARD: Final = 5
-"""Largest change of a motor's units by one command in a backward drive on a slow network. In such a
-drive, the driver does not notice that a command arrives twice."""
+"""Largest change of a motor's units by one command in a backward drive on a slow network. The limit
+is small, because the driver may not notice that the command arrives twice."""
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
 
@@ -60,13 +60,13 @@ HOLD_AFTER_S: Final = 1.0
 integrate the heading error."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Factors for the growth of the relative variance of the wheel speeds' ratio.
+"""Growth of the uncertainty of the wheel speed ratio with each new set-point.
 
-Each new set-point adds a factor times the squared relative change of the set-point:
+The ratio's relative variance grows by a factor times the squared relative change of the set-point.
 
-* ``COPIED``: if the set-point may arrive twice, because an exchange takes more than ``SLOW_TRIP_S``
-  (s) on average.
-* ``MISSED``: if the server did not answer the set-point.
+* ``COPIED``: factor if the set-point may arrive twice.
+* ``MISSED``: factor if the server did not answer the set-point.
+* ``SLOW_TRIP_S``: average duration of an exchange, in s, above which a set-point may arrive twice.
 """
 
 
@@ -185,8 +185,8 @@ class SpeedLoop(Motors):
     ) -> None:
         """Use a displacement, measured over ``seconds``, to learn how fast the motors turn.
 
-        ``right_only``: whether only the right wheel was measured. The left motor's line then
-        changes like that of the right motor.
+        ``right_only``: whether only the right wheel was measured. If so, the left motor is assumed
+        to have changed like the right motor.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

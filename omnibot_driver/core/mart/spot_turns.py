@@ -29,7 +29,8 @@ HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for learning from slow turns, as fractions of the commanded rate.
 
 * ``LEAST_LESSON``: lowest rate that the driver learns. It replaces a lower measured rate.
-* ``HELD``: lowest measured rate of a later turn. In a slower turn, something holds the robot.
+* ``HELD``: lowest measured rate from which the driver learns, once it has learned from a turn. In a
+  slower turn, something holds the robot.
 """
 EVEN: Final = 0.15
 """Relative change of the rate during a turn, below which the driver learns from the turn."""

@@ -53,7 +53,7 @@ STUCK_S, COASTS_S = 0.5, 0.2
 
 
 class StopReasons(Ground):
-    """The part of the pilot that decides whether the motion in progress may continue."""
+    """The part of ``Pilot`` that decides whether the motion in progress may continue."""
 
     def _order(self, now: float) -> Drive | GoTo | None:
         return moving_order(self._wanted, now)
@@ -77,9 +77,10 @@ class StopReasons(Ground):
         return True
 
     def _why_stop(self, now: float) -> str:
-        """Return why the current motion must not continue, as a sentence for the user.
+        """Return why the current motion must stop. The result is empty if the motion may continue.
 
-        Return "wanted" if another motion is commanded; empty if the motion may continue.
+        The reason is "wanted" if another motion or a stop is commanded. Any other reason is a
+        sentence for the user.
         """
         if self.state not in (State.STARTING, State.MOVING, *ROLLING):
             return ""

@@ -182,10 +182,10 @@ class Stopping:
 
     @property
     def doubtful_result(self) -> Ok | None:
-        """The doubtful reply that is probably the reply to the stop command, or None.
+        """The doubtful reply that is most probably the reply to the stop command, or None.
 
-        The last one with a plausible number is preferred. None if earlier requests may have caused
-        all doubtful replies.
+        The last reply with a plausible number is preferred. The result is None if earlier requests
+        may have caused all doubtful replies.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -40,13 +40,13 @@ NAMES: Final = {
 
 
 class Stops(StopReasons, ABC):
-    """The part of the pilot that stops motions."""
+    """The part of ``Pilot`` that stops motions."""
 
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
         ``why``: the fault, for a notice; empty without a fault. A fault also discards the user's
-        command, unless this motion is blocked.
+        command, except when the driver already refuses this motion (``_blocked``).
 
         ``arrived``: whether the server has certainly received the start.
         """
