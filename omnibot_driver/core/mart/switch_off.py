@@ -98,8 +98,8 @@ class SwitchOff:
     def missed(self, word: Word, *, disturbed: bool = False) -> bool:
         """Record that MCS or MSM was not answered; return whether the driver gives up MCS now.
 
-        After MOST_MISSES in a row, or MOST_MISSES_DISTURBED if ``disturbed``, motions are allowed
-        again. ``connect`` or ``doubt`` allows MCS again.
+        After MOST_MISSES in a row (MOST_MISSES_DISTURBED in a ``disturbed`` network), the driver
+        allows motions. ``connect`` or ``doubt`` allows MCS again.
         """
         self._misses += 1
         if self._misses < (MOST_MISSES_DISTURBED if disturbed else MOST_MISSES):

@@ -50,7 +50,7 @@ class WheelCount:
     * ``last``: last accepted count.
     * ``told_s``, ``from_s``: most probable and earliest possible time of the last count.
     * ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
-    * ``maybe``: the last reported count, if the last start command may be lost; else 0.
+    * ``maybe``: the last reported count, if it may be older than the motion; else 0.
     """
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class WheelCount:
     def refused(self) -> bool:
         """Record that the server knows of no motion; return whether the server was restarted.
 
-        A restart is proved if the server has sent a count of the motion, but no acknowledgement.
+        If a count of the motion has come, but no acknowledgement, a restart has ended the motion.
         """
         if self._confirmed:
             return False

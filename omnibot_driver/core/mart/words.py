@@ -48,8 +48,8 @@ class Word:
 
     * ``forms``: the forms that a successful reply can have.
     * ``takes_s``, ``least_s``: longest and shortest time from the request to the reply, in s.
-    * ``fails``: the texts that may follow ``fail`` in the reply. A text of no command is accepted,
-      too.
+    * ``fails``: the texts that may follow ``fail`` in the reply. A text that no command lists in
+      ``fails`` is accepted, too.
     """
 
     text: str
