@@ -195,8 +195,8 @@ class SampleBoundary:
     * ``cut``: whether the end of this sample is missing.
     * ``latest_s``: latest time in s after the read at which the cut sample can be complete; 0
       without a cut sample.
-    * ``earliest_s``: earliest time in s after the read at which the cut sample can be complete, or
-      the next sample if none is cut.
+    * ``earliest_s``: earliest time in s after the read at which the cut sample can be complete.
+      Without a cut sample, the next sample counts.
     """
 
     ahead: int

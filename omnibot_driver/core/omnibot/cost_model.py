@@ -34,8 +34,8 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of the assumption that a frame gained bytes, if a header follows at the frame's usual
-length. In this case, the frame has probably gained no bytes."""
+"""Extra cost of assuming that a frame gained bytes, if the next header is at its usual place. The
+frame has then probably gained no bytes."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 
@@ -123,8 +123,8 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which the decoder no longer expects a first delta. A first delta
-is expected at the beginning of a stream, and after damage."""
+"""Number of missing deltas after which the decoder no longer expects a delta, at the beginning of a
+stream or after damage."""
 
 
 class Context(NamedTuple):
@@ -273,8 +273,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    For an IMU frame, the byte must also be FF, or its word must differ from that of the previous
-    IMU frame.
+    For an IMU frame, the byte must also be FF, or the last word must differ from that of the
+    previous IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -4,8 +4,8 @@
 
 A header alone proves nothing: a gyro at rest gives the same bytes. A frame that directly follows an
 accepted one is *in step*. It is accepted, except if evidence speaks against it. All other bytes are
-*uncertain*. They wait until the search in ``trellis`` has a clear result, or until ``DOUBT_BYTES``
-are held.
+*uncertain*. They wait for a clear result of the search in ``trellis``; when ``DOUBT_BYTES`` wait,
+the first half is decided anyway.
 
 This module reads no clock, and no input makes it raise an exception.
 """

@@ -99,8 +99,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
-    If so, the unusual content comes from a shock, not from damage. At the end of ``held``, the
-    result is ``closed``.
+    If so, the unusual content comes from a shock, not from damage. ``closed``: the result if
+    ``held``, the received bytes, ends at ``at``.
     """
     if at == len(held):
         return closed

@@ -55,9 +55,9 @@ class InterFrameGaps:
     """The pauses within the bytes that the decoder holds, and what is known of this line's pauses.
 
     * ``byte_s``: time in s that the line takes for a byte.
-    * ``between``: whether pauses are normally between frames, so that a frame begins somewhere in
-      the read after a pause.
-    * ``sharp``: whether this frame normally begins with the first byte of the read.
+    * ``between``: whether pauses are normally between frames, so that a frame begins in the read
+      after a pause, at any byte.
+    * ``sharp``: whether this frame normally begins at the first byte.
     * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. After that,
       further confirmations are not counted.
     * ``at_pace``: whether the line was busy for the whole time between the last two reads.
@@ -80,7 +80,7 @@ class InterFrameGaps:
         self._sharp = self._between = 0
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
-        """Record a read of ``arrived`` bytes, and the pause before it if the line was idle then.
+        """Record a read of ``arrived`` bytes, and a pause if the line was idle before these bytes.
 
         ``pause_s``: time in s since the previous read. ``place``: position of the first new byte
         among the held bytes.
@@ -105,7 +105,7 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Record a pause between frames, before a read of complete frames, if the line was idle.
+        """Record a read that begins with a frame. A pause before the read was between frames.
 
         ``pause_s``: time in s since the previous read. ``arrived``: number of bytes in the read.
         """

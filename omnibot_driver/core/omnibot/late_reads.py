@@ -2,9 +2,8 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-* The line was idle. If bytes that look like a frame contain the pause, other bytes were lost: the
-  beginning and the end of the supposed frame come from different ticks. All later frames seem late
-  by whole ticks.
+* The line was idle. If a supposed frame contains the pause, bytes were lost: the beginning and the
+  end of the frame come from different ticks. So all later frames seem late by whole ticks.
 * Only the reader was late. The frames after the pause are on time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
@@ -51,8 +50,8 @@ Within this tolerance, the bytes did not wait for the reader.
 FEW_BYTES: Final = 2
 """Largest number of bytes that is too small to measure how fast bytes arrive.
 
-The measurement uses the end of a frame with a pause: the bytes after the first read that follows
-the pause.
+In a frame with a pause, the measurement begins after the first read that follows the pause, and
+ends with the frame.
 """
 TICKS_TO_PROVE: Final = 2
 """Number of further late ticks, after a first late tick, that prove that bytes were lost.

@@ -87,8 +87,8 @@ def take_single(
 ) -> ImuReading | None:
     """Return the reading of one usual, due IMU frame; else return None and change nothing.
 
-    ``first``, ``now``: length and arrival time of the first piece. With more pieces, the last byte
-    must not begin the next header.
+    ``first``, ``now``: length and arrival time of the frame's first read. If the frame came in
+    several reads, its last byte must not begin the next header.
     """
     pause_s = now - decoder.last_arrival_s
     if (

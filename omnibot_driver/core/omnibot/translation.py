@@ -59,8 +59,7 @@ class Translation:
     """Translates the frames of one line. Infers the board's mode and wrong settings from them.
 
     * ``settings``: may be replaced, except ``delta_period_s``.
-    * ``singles_to_come``: how many more IMU frames the fast path ``single_imu`` may decode without
-      this class.
+    * ``singles_to_come``: how many more IMU frames the fast path ``single_imu`` may decode.
     * ``heard_s``: arrival time in s of the last decoded bytes.
     """
 
