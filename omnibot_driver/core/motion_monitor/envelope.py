@@ -22,10 +22,9 @@ The ratio is above 1, because controllers overshoot, and users measure the board
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: always allowed deviation from the hull, in m/s and rad/s.
+"""``NOISE_MPS``, ``NOISE_RADPS``: always allowed deviation from the set-points, in m/s and rad/s.
 
-The hull is that of the recent set-points. The encoders' resolution, rounding and slopes can cause
-such a deviation.
+The encoders' resolution, rounding and slopes can cause such a deviation.
 """
 SIDEWAYS: Final = 0.1
 """Deviation from the set-points that is allowed in any direction.
@@ -62,8 +61,8 @@ _DIRECTIONS: Final = tuple(
 )
 """Directions in which the distance of a velocity from the hull of allowed velocities is computed.
 
-Between two directions, the computed distance is too small by up to 2 %, plus a tenth of the hull's
-length.
+Between directions, the computed distance is too small by up to 2 % of itself, plus 10 % of the
+hull's length.
 """
 
 

@@ -18,22 +18,23 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
-A robot that is clearly slower than all set-points of this time is assumed to be held.
+A robot that is clearly slower than every set-point within this time is assumed to be held.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of the error's limit that a displacement of up to 60 ms, or a longer one, adds.
+"""``LARGEST_PART``: largest fraction of the error's limit that one displacement adds.
 
-So only three displacements in a row, or two longer ones, can exceed the limit.
+For displacements over 60 ms, ``LARGEST_PART_OF_A_LONG_ONE`` applies. So only three displacements in
+a row, or two long ones, can exceed the limit.
 """
 
 
 class FollowingError:
-    """The following error of one robot: the sum of its motion outside the envelope.
+    """The following error of one robot: the sum of the motion that its set-points do not allow.
 
     * ``slack_mps``, ``slack_radps``: tolerated excess of a velocity, in m/s and rad/s.
-    * ``outside``: whether the last displacement exceeded the envelope by more than the slack.
+    * ``outside``: whether the last displacement's excess was above the slack.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:

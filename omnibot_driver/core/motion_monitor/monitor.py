@@ -225,8 +225,8 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot whose motion does not fit its commands.
 
-        Motion within 60° of a set-point's direction is too fast; other motion goes the wrong way.
-        With an unknown heading, linear motion is too fast.
+        Such a linear motion is too fast within 60° of a set-point's direction, or with an unknown
+        heading; otherwise, it goes the wrong way.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

@@ -27,7 +27,7 @@ HELD_S: Final = 0.3
 This time includes the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant, in s, with which the velocity that a replaced set-point allows decays.
+"""Time constant, in s, of the decay of the velocity that a replaced set-point still allows.
 
 The decay begins after ``HELD_S``. The value is long enough for robots with a time constant of up to
 0.35 s.

@@ -31,8 +31,8 @@ FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants of the wind-up's decay, in s.
 
-``FORGOTTEN_AT_REST_S`` applies while the robot is commanded to rest. A robot that is held at rest
-keeps its wind-up for longer.
+``FORGOTTEN_AT_REST_S`` applies while the set-point is rest: if someone holds the robot then, the
+wind-up lasts longer.
 """
 HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""
@@ -57,9 +57,10 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m to add to the wind-up if the robot is held in the next displacement too.
+        """Wind-up in m of the last displacement; the next displacement must confirm the wind-up.
 
-        0: the robot was held in the last displacement, and nothing is due. None: it was not held.
+        It is added to ``way_m`` if the robot is held in the next displacement, too. 0: nothing is
+        left to add. None: the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
@@ -75,7 +76,7 @@ class WindUp:
         return explained
 
     def carry(self, motion: BodyTwist, seconds: float) -> None:
-        """Add to the wind-up the motion of a robot that someone moves by hand.
+        """Add to the wind-up the distance by which someone moves the robot by hand.
 
         The caller calls this method only while the set-point is rest.
         """
@@ -93,7 +94,7 @@ class WindUp:
         """Add to the wind-up the distance by which a held robot falls behind its set-point.
 
         * If the robot is not held, the wind-up decays.
-        * ``motion``: mean twist during ``seconds``, within the envelope of the set-points.
+        * ``motion``: measured mean twist during ``seconds``, which the set-points allow.
         * ``newest``: set-points that the robot may still be approaching, the current one first.
         * ``heading_known``: if False, the direction of the linear velocity is not checked.
         """

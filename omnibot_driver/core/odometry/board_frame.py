@@ -14,10 +14,10 @@ from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
 
 BEGUN_M: Final = 0.005
 BEGUN_RAD: Final = 0.01
-"""``BEGUN_M``, ``BEGUN_RAD``: a pose this near to the expected one shows a board's start at zero.
+"""``BEGUN_M``, ``BEGUN_RAD``: tolerances, in m and rad, of a pose that shows a new board frame.
 
-The limits are in m and rad. The expected pose is that after such a start; a robot rarely stops so
-near.
+Such a pose is this near to the pose that is expected if the board began at zero. A pose in the old
+frame is rarely so near.
 """
 
 
@@ -53,10 +53,10 @@ class BoardFrame:
         self.pose = self.gate.proved = None
 
     def continues(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether a pose continues the board's frame, although the pose counter began anew.
+        """Return whether the board's frame continues, although the pose counter began anew.
 
-        A damaged pose also makes the counter begin anew, but without a loss. ``gap``: covariance of
-        the motion lost since the last accepted pose.
+        The cause is then a damaged pose: unlike a restart, it loses no displacements. ``gap``:
+        covariance of the motion lost since the last accepted pose.
         """
         if self.pose is None or self.since_restart is not None:
             return False
@@ -66,9 +66,9 @@ class BoardFrame:
     def was_replaced(
         self, told: Pose, before: Pose, gap: Covariance, *, confirmed: bool, reachable: bool
     ) -> bool:
-        """Return whether a pose shows that the board uses a new frame since a suspected restart.
+        """Return whether the pose ``told`` shows that the board has begun a new frame.
 
-        * A pose that refutes the restart ends the suspicion.
+        * If ``told`` refutes the suspected restart, the suspicion ends.
         * ``before``: ``told`` minus the displacements that wait for a pose.
         * ``confirmed``: whether ``told`` agrees with the last unexpected pose of the board.
         * ``reachable``: whether the robot can have reached ``told`` without a restart.

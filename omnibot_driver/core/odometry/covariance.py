@@ -24,7 +24,7 @@ INITIAL_VARIANCE: Final = 1e-6
 UNKNOWN_YAW_VARIANCE: Final = math.pi**2 / 3
 """Variance of a direction of which nothing is known, in rad²."""
 ASTRAY: Final = 0.7
-"""Position error that ``Astray`` adds, in m per driven metre and per rad² of heading variance."""
+"""Extra position error, in m per driven metre and per rad² of heading variance (see ``Astray``)."""
 ASTRAY_RAD2: Final = 0.03
 """Variance of the heading, in rad², above which the odometry adds two position errors (``Astray``).
 
@@ -105,8 +105,8 @@ class Covariance:
     def of_direction(self) -> "Covariance":
         """The covariance if the yaw is regarded as a direction, as in a quaternion.
 
-        The yaw's variance is at most that of an unknown direction. Its covariances decrease by the
-        same factor.
+        The yaw's variance is limited to that of an unknown direction. Its covariances are reduced
+        in proportion.
         """
         if self.yaw_yaw <= UNKNOWN_YAW_VARIANCE:
             return self
@@ -141,8 +141,8 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 class Astray:
     """Two position errors, along and across the motion, that grow with the variance of the heading.
 
-    The position error that is proportional to the heading's error is not included. ``m2``: variance
-    of x and of y, in m².
+    ``Covariance.carried`` adds the position error that is proportional to the heading's error.
+    ``m2``: variance of x and of y, in m².
     """
 
     def __init__(self) -> None:
@@ -247,7 +247,7 @@ class Uncertainty:
         self.gap = self._halt = NOTHING
 
     def bound(self, way_m: float, turn_rad: float) -> None:
-        """Set the total uncertainty of all gaps to the error that the gaps have caused.
+        """Set the uncertainty of all gaps to their known error.
 
         ``way_m``, ``turn_rad``: this error in m and rad. The error stays uncorrected, because
         ``use_board_pose`` is False.

@@ -64,7 +64,7 @@ class Odometry:
         self._since_gap: Pose | None = None
         """The pose that the board would report now if it had begun a new coordinate frame in a gap.
 
-        The longest gap since the last pose counts. None without a gap, or if it began near the
+        The longest gap since the last pose counts. None without a gap, or if the gap began near the
         origin.
         """
         self._gap_lost = 0
@@ -101,8 +101,8 @@ class Odometry:
     def reset(self, now: float = math.inf) -> list[OdometryEstimate]:
         """Move the origin of the odometry frame to the robot's current pose.
 
-        Return the estimates of displacements that waited for a pose. Motion in a gap that is mostly
-        before ``now`` (s, by the stamps' clock) is discarded.
+        Return the estimates of displacements that waited for a pose. If most of a gap was before
+        ``now`` (s, by the stamps' clock), its motion is discarded.
         """
         self.alignments += 1
         due = []
@@ -235,8 +235,8 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the pose is in a new frame of the board, which the odometry must adopt.
 
-        ``confirmed``: whether the pose agrees with the last unexpected pose; the result while no
-        frame is known.
+        ``confirmed``: whether the pose agrees with the last unexpected pose. While no frame is
+        known, a confirmed pose is enough.
         """
         frame = self._frame
         if frame.pose is None:

@@ -64,7 +64,7 @@ class GapInterpolation:
     def before(self, told: Pose, waiting: PendingDisplacements) -> Pose:
         """Return the pose before the waiting displacements, if ``told`` is the pose after them.
 
-        If displacements were lost among the waiting ones, the lost motion is interpolated.
+        The displacements wait for a pose. Motion that was lost among them is interpolated.
         """
         start, readings = waiting.before(told), waiting.readings
         if not any(reading.lost for reading in readings):
@@ -82,7 +82,8 @@ class GapInterpolation:
         """Record that a pose was accepted.
 
         ``way``: correction of the assumed motion since the previous accepted pose; a tangent in
-        body axes. It corrects ``last`` if all displacements since then were lost.
+        body axes. If all displacements since then were lost, ``way`` also corrects ``last``, the
+        newest tangent.
         """
         if self._only_poses and self.missing and self.last is not None:
             tangent, period_s = self.last

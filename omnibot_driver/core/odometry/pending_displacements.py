@@ -60,8 +60,8 @@ class PendingDisplacements:
     def lost_s(self) -> float:
         """Estimated duration in s of the displacements lost before the first one that waits here.
 
-        Each is assumed to last as long as this first one. If that duration is unknown, the value is
-        0.
+        The value is their number times the duration of the first waiting displacement; 0 if this
+        duration is unknown.
         """
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 

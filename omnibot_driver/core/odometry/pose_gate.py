@@ -48,8 +48,8 @@ class PoseGate:
     def displaced(self, reading: DisplacementReading, *, bridges: bool) -> None:
         """Add a reported motion of the robot to ``doubted``, a pose that must still be confirmed.
 
-        ``bridges``: whether to add the displacements lost before, too, each assumed equal to this
-        one. If False, the caller calls ``bridged``.
+        ``bridges``: whether to add the displacements lost before, too, each assumed equal to
+        ``reading``. If False, the caller adds them with ``bridged``.
         """
         if self.doubted is None:
             return

@@ -68,16 +68,16 @@ class PoseTracker:
         """Return the tangent (twist x time) from the robot's best pose to ``place``.
 
         The tangent is like the board's reports: in the board's body axes, not corrected by
-        ``scale``. It turns by the smaller angle.
+        ``scale``. It turns the shorter way.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
 
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Move along a tangent (twist x time). The motion took ``seconds``.
+        """Move along a tangent (twist x time). The motion took ``seconds`` by the board's clock.
 
-        ``stamped_s``: duration in s by the stamps. The published pose moves at most as far as the
-        robot can in this time.
+        ``stamped_s``: duration in s by the stamps. The published pose moves no farther than the
+        robot can in ``stamped_s``.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
@@ -119,10 +119,10 @@ class PoseTracker:
         self.uncertainty.settle()
 
     def bound(self, tangent: Pose) -> None:
-        """Set the total uncertainty of all gaps until now to the error that the gaps have caused.
+        """Set the uncertainty of all gaps to their known error.
 
-        ``tangent``: this error (twist x time), which stays uncorrected, because ``use_board_pose``
-        is False.
+        ``tangent``: this error (twist x time). The error stays uncorrected, because
+        ``use_board_pose`` is False.
         """
         error = _times(tangent, self._size)
         self.uncertainty.bound(error.way_m, error.yaw_rad)
