@@ -94,7 +94,7 @@ class ModeManager:
         self._mode_known = False
         """Whether the board's mode was known when the last reset was sent.
 
-        Only then does a pause that begins after the reset show a restart.
+        If the mode was unknown, a later pause does not prove a restart.
         """
         self._shown_at = math.inf
         self._request: Request | None = None
@@ -223,7 +223,7 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether no change of mode is due, so that data from a running board need no action.
+        """Whether the mode manager has nothing to do when a running board sends data.
 
         The value is True in the phase SETTLED, if no request is open and the wanted mode is not
         PAUSED.

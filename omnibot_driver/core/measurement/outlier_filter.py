@@ -28,7 +28,7 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 STILL: Final = 0.08
-"""Tolerance of the check for spikes of the IMU, as a fraction of a change.
+"""Tolerance of the check for spikes of the IMU, as a fraction of the spike.
 
 The reading after a spike returns within this tolerance. If a bit of one value flips, the other
 values stay within it.
@@ -43,7 +43,7 @@ After a loss, for example, the durations differ so much that a steady motion wou
 change.
 """
 BACK: Final = 0.25
-"""Tolerance of the check for spikes of displacements, as a fraction of a change.
+"""Tolerance of the check for spikes of displacements, as a fraction of the spike.
 
 A change is a spike only if the next displacement returns to the displacement before the change,
 within this tolerance.

@@ -24,7 +24,7 @@ class StreamStatistics:
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
     * ``imu_period_s``: period of the IMU in s, for counting lost readings; None if each IMU reading
-      has its own ``lost``.
+      counts them (``lost``).
     """
 
     imu_period_s: float | None = None
@@ -43,7 +43,8 @@ class StreamStatistics:
     delay_s: float = 0.0
     """Sum of delays in s: for each of the ``reads``, the age of its newest sample.
 
-    An age can be a few microseconds below 0, because each stamp is later than the one before.
+    An age can be a few microseconds below 0: stamps always increase, even beyond the time of the
+    read.
     """
     squared_delay_s2: float = 0.0
     same_force: int = 0
@@ -67,8 +68,7 @@ class StreamStatistics:
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
         """Count the readings of one read. ``delay_s``: age of its newest sample, in s.
 
-        If the last reading is an IMU sample or a displacement, the age is added to the sum of
-        delays.
+        The sum of delays contains only ages of IMU samples and displacements.
         """
         if isinstance(readings[-1], (ImuReading, DisplacementReading)):
             self.reads += 1
