@@ -96,8 +96,8 @@ class Keeper:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
         * ``stopped``: whether the robot is already stopped. If not, the guard first stops it.
-        * ``written``: whether the driver wrote its last packets. If not, the guard that stops the
-          robot first discards unsent output.
+        * ``written``: whether the driver wrote its last packets. If not, the guard discards unsent
+          output before it stops the robot.
         """
         self._restart_at = math.inf
         if stopped:

@@ -133,7 +133,7 @@ def transform_message(
 
 
 def unturned(kinematics: Kinematics) -> Wheels:
-    """Return the state of wheels that have not rolled yet."""
+    """Return the state of the wheels before any motion."""
     return Pose(), (0.0,) * len(kinematics.joints), ()
 
 

@@ -28,10 +28,9 @@ class Outbox:
         self._closed = False
 
     def put(self, delivery: Delivery) -> None:
-        """Append a call, without waiting.
+        """Append a call that delivers an event, without waiting.
 
-        The caller must hold the lock under which the event occurred, so that the calls keep the
-        order of the events.
+        The caller must hold the lock of the events, so that the calls keep the order of the events.
         """
         self._waiting.append(delivery)
 

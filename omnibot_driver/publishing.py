@@ -244,10 +244,10 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether the driver has not logged this text since the last change of state.
+        """Return whether this text is new, and record the text as logged.
 
-        The text is then regarded as logged. A change to the state disconnected or connecting does
-        not make earlier texts new again.
+        A change of state makes all texts new again, except a change to the state disconnected or
+        connecting.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

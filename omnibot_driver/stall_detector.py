@@ -74,7 +74,7 @@ class StallDetector:
         self._day_ns = wall_ns - round(now * 1e9)
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
-        """Return False if a command may have been sent before or during a recent stall, else True.
+        """Return whether a command is regarded as newer than the last stall; False if uncertain.
 
         ``sent_ns``: when the command was sent, as time of day in ns.
         """

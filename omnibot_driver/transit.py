@@ -35,12 +35,11 @@ NTP can shift a clock gradually by ``LARGEST_CORRECTION_S`` (s) in addition, but
 a larger error.
 """
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which an early message fits its sender worse than a message that is equally late."""
+"""Weight of an early arrival in the choice of a message's sender. A late arrival has weight 1."""
 ALIKE_S: Final = 0.02
-"""Largest difference, in s, at which the misfits of two senders are regarded as equal.
+"""Largest difference, in s, at which a message's time fits two senders equally well.
 
-If several senders fit equally well, the driver chooses the sender whose last message had the
-highest number.
+The driver then chooses the sender whose last message had the highest sequence number.
 """
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
@@ -207,8 +206,8 @@ class _Offset:
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
         """Return how badly a message fits this offset: least and largest possible misfit in s.
 
-        ``_Sender.misfit_s`` defines the misfit. A sender has two offsets: one for each of our
-        clocks.
+        The misfit is the time by which the message is late, or ``CLOCK_RETREATS`` times the time by
+        which it is early.
         """
         excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
         weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS

@@ -77,7 +77,8 @@ class Shutdown:
     def broken_off(self) -> Packets:
         """Return the packets to write before the port is closed, if the last write was incomplete.
 
-        These packets wake the board. If the e-stop is latched, they also repeat the emergency stop.
+        These packets end the incomplete command, stop the wheels and, if the e-stop is latched,
+        repeat the emergency stop.
         """
         return self._board.wake() + self._estop_again()
 

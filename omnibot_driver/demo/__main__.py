@@ -119,7 +119,7 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo; return the exit code.
 
-    The demo ends after its time, at SIGINT or SIGTERM, or when the user quits the monitor.
+    The demo ends after ``DEMO_SECONDS``, at SIGINT or SIGTERM, or when the user quits the monitor.
     """
     parser = argparse.ArgumentParser(
         prog="demo",

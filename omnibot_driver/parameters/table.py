@@ -80,8 +80,8 @@ DISPENSABLE: Final = frozenset(
 """Common parameters that a board may omit. The driver reads all others that fit the traits of the
 board."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
-"""Values of the parameter ``on_exit`` besides ``stop``. Each value has the request that the driver
-sends to the board when the driver ends. A board offers a value if it supports the request."""
+"""Values of the parameter ``on_exit`` besides ``stop``, each with the driver's last request to the
+board. A board offers a value if it supports the request."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,7 +71,7 @@ def alternate(
     times: int,
     goal: float | None = None,
 ) -> Figure:
-    """Measure the driver, then the floor program; do this ``times`` times. Return the results."""
+    """Measure the driver and the smallest program (``floor``) in turn; return ``times`` pairs."""
     pairs = [(ours(), floor()) for _ in range(times)]
     return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
 

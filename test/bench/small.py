@@ -87,7 +87,7 @@ class Group:
 
 
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
-    """Return the rows of a table: the results of driver and floor for each share of one core.
+    """Return table rows: results of driver and floor (the smallest relay) for each share of a core.
 
     ``seconds``: duration of the measurement with each share. If cgroups cannot be used, return a
     sentence with the reason.

@@ -40,10 +40,10 @@ Estimates = list[ImuEstimate | OdometryEstimate]
 
 
 class Relay:
-    """A relay that publishes messages from the bytes of one read.
+    """A relay that publishes a board's data as messages.
 
-    The methods ``trust``, ``decode`` and ``measure`` take the bytes. Each step in ``STEPS`` calls
-    one of these methods.
+    Each step in ``STEPS`` relays the bytes of a read by one of the methods ``trust``, ``decode``
+    and ``measure``.
     """
 
     def __init__(self, node: Node) -> None:

@@ -20,17 +20,17 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-The blocks must cover more than 20 s: with an adapter's timer that is wrong by 100 ppm, the smallest
-delay occurs every 20 s.
+The blocks must cover more than 20 s: behind an adapter, the smallest delay may occur only every
+20 s (clock error: 100 ppm).
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm plus a margin
 of 20 ppm."""
 SUPPORT: Final = 0.75
-"""Selects the edge of a convex hull that serves as the fitted clock without lower bounds.
+"""Selects the edge of a convex hull that serves as the fitted clock.
 
-The value is the edge's position in time, 0 to 1. A larger value follows recent points more closely,
-with more jitter.
+The hull is used if the fit uses only upper bounds of tick times. A larger value (0 to 1) selects a
+later edge, which follows recent points more closely, with more jitter.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -40,8 +40,8 @@ LATE_PART: Final = 0.1
 ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest distance between the two bounds of a block of ticks, in periods of a tick. Beyond it, the
-lower bound is not used. An adapter's 16 ms timer causes a distance below 0.2 (2 ms)."""
+"""Largest distance between upper and lower bound of a block's tick times, in periods. Beyond it,
+the lower bound is not used. An adapter's 16 ms timer causes a distance below 0.2 (2 ms)."""
 
 Point = tuple[int, float]
 """The number of a tick, and an upper or lower bound of its time, in s."""
@@ -72,7 +72,7 @@ class ClockFit:
         """Add an upper bound of a tick's time.
 
         ``latest``: number of the newest tick in a read, and a time in s by which this tick had
-        arrived. ``cut``: whether the read ended within its sample.
+        arrived. ``cut``: whether the tick's sample was incomplete in this read.
         """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor

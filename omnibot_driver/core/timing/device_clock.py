@@ -32,8 +32,9 @@ BEAT_READS: Final = 12
 """Number of consecutive reads that certainly include a read with little delay. An adapter with a
 timer of 16 ms reads at five phases of a 10 ms tick; 12 reads contain each phase twice."""
 CALM: Final = 0.45
-"""Largest distance of the last two reads from the fitted clock, in periods, for the fast path. Keep
-the value below 0.5: half-way between two ticks, a read's tick is uncertain."""
+"""Largest distance of the last two reads from the fitted clock, in periods, for the fast path
+(``DeviceClock.stamp``). Keep the value below 0.5: half-way between two ticks, a read's tick is
+uncertain."""
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period.
 
@@ -101,8 +102,8 @@ class DeviceClock:
     ) -> list[float]:
         """Return the sampling time in s of each reading. A displacement has the stamp of its tick.
 
-        Stamps increase from tick to tick, and are not later than the read at ``now``. ``edge``:
-        None if unknown.
+        Stamps increase from tick to tick, and are not later than the read at ``now``. ``edge``: end
+        of this read; None if unknown.
         """
         if self._stamped_tick is None and now - self._seen_at > self._longest_loss_s:
             self.restart()  # only a part of a sample has arrived, long ago
@@ -189,8 +190,8 @@ class DeviceClock:
     def _missing(self, reading: DisplacementReading) -> int:
         """Return how many ticks to add to the tick number, as a displacement's counter shows.
 
-        The result is negative if the tick number is too high, and 0 without an earlier displacement
-        or a duration.
+        The result is negative if the tick number is too high, and 0 if the displacement is the
+        first one or has no duration.
         """
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
@@ -251,7 +252,7 @@ class DeviceClock:
         """Record the delay of a new tick, and the time ``now`` at which the tick was read.
 
         ``lag_s``: arrival minus the time by the fitted clock. If the previous tick was read late,
-        this delay replaces its delay.
+        ``lag_s`` replaces the delay of that tick.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s

@@ -67,7 +67,7 @@ class SimulatorModule(Protocol):
     TITLE: str
     """Name of the board in the sentence "A simulated ... board listens on"."""
     CHANNELS: tuple[Channel, ...]
-    """Channels of each board of this kind."""
+    """Connections of the board to the computer."""
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
         """Add the options of this board to the parser, except those that all boards share."""

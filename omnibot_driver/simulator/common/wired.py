@@ -49,7 +49,7 @@ class WiredBoard(Generic[B]):
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
         """Send data to the board; ``now`` is in s, by any monotonic clock.
 
-        A datagram passes through its line. Serial bytes reach the board at once, without faults.
+        The line's faults affect datagrams. Serial bytes reach the board at once, without faults.
         """
         line, time_s = self.lines[channel], self._time_s
         if isinstance(line, FaultyLine):

@@ -10,7 +10,7 @@ import re
 from enum import Enum
 
 BUFFER = 200
-"""Size of the line buffer, in characters. A longer line loses the characters in the full buffer."""
+"""Size of the line buffer, in characters. When the buffer is full, the next character clears it."""
 
 _CONTROL_CHARACTERS = bytes(range(0x20))
 _NUMBER = re.compile(r"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")

@@ -31,7 +31,8 @@ class Fix:
 def fix_at(start: tuple[float, float], x_m: float, y_m: float, utc_s: float) -> Fix:
     """Return the fix ``x_m`` east and ``y_m`` north of ``start`` (latitude, longitude in degrees).
 
-    ``utc_s``: time in s since 2000-01-01, if a year has 365 days and a month 31 (December: 24).
+    ``utc_s``: time in s since 2000-01-01, in a simplified calendar: 365 days per year, 31 per
+    month (December: 24).
     """
     latitude = start[0] + y_m / METRES_PER_DEGREE
     longitude = start[1] + x_m / (METRES_PER_DEGREE * cos(radians(start[0])))

@@ -56,7 +56,7 @@ class Motion:
 
     * ``running``: whether the motion is in progress; the server then refuses other motions.
     * ``watching``: whether the module ``alarms`` supervises the motion.
-    * ``posts``: number of reports of a start or an end that no port has waited for yet.
+    * ``posts``: number of starts and ends that no command has noticed yet.
     * ``right``, ``left``: motor registers, as the server knows them.
     * ``sampled_s``: time of the last sample of the IMU, or -1.
     * ``moved_s``, ``turned_s``: first and last time at which the right wheel turned.

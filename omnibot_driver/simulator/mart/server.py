@@ -171,7 +171,7 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` when ``post`` reports the next start or end of a motion of ``kind``.
 
-        If an earlier report was kept, ``then`` is called at once. Otherwise, ``port`` waits.
+        An earlier report counts if no command has used it. ``port``: the waiting command's port.
         """
         motion = self.motions[kind]
         if motion.posts:

@@ -26,8 +26,8 @@ class Quirks:
     * ``drives_trust_imu``: without an IMU, RM, R and L start, and uncontrolled motions continue,
       but the server does not detect obstacles, or that the robot starts or stops.
     * ``reference_speed_wraps``: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
-    * ``reference_start_counts_on``: RM continues the count of samples of the previous RM, instead
-      of counting from 0. A failed RM is answered with the error of the last F or B, not of RM.
+    * ``reference_start_counts_on``: RM continues the previous RM's count of samples, so RM may
+      fail at once. The reply to a failed RM has the error of the last F or B.
     * ``speed_word_first``: a speed word after the number is ignored.
     * ``zero_distance_is_unlimited``: TF, TB, MCF and MCB with 0 or a word as distance have no
       limit.

@@ -28,8 +28,8 @@ REQUESTS: Final = 3
 """Number of times that the tool sends a request that may be repeated. The middleware drops an
 answer if the driver discovers the new client too late."""
 SPIN_S: Final = 0.005
-"""Time, in s, for which each call of the executor waits. After a change of this time, rclpy begins
-its round of callbacks again. With changes in each call, a busy computer would never process the
+"""Time, in s, for which each call of the executor waits. All calls must use the same time: with
+another time, rclpy begins its round of callbacks again, and a busy computer may never process the
 e-stop's messages."""
 
 

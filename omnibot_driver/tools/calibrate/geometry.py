@@ -188,8 +188,8 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first error is for the driver's current geometry. The second is for ``found``, with its mean
-    wheel radius for all wheels.
+    The first error is for the driver's current geometry, the second for the base radius and the
+    mean wheel radius of ``found``.
     """
     before: list[float] = []
     after: list[float] = []

@@ -129,8 +129,8 @@ class Obedience:
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
         """Add the motion in the last ``seconds``, and check at intervals that the robot moves.
 
-        ``measured``: velocity, in the units of ``command``. Raises ToolError if the robot moves
-        less than a fifth of a command above ``PLAIN``.
+        ``measured``: velocity, in the units of ``command``. Raises ToolError if commands above
+        ``PLAIN`` yield less than a fifth of the commanded motion.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

@@ -49,7 +49,7 @@ class Step:
     * ``before_radps``, ``after_radps``: commanded rates.
     * ``end_ticks``: end of each odometry delta, in ticks after the onset.
     * ``rate_radps``: mean rate in each odometry delta, which lasts four ticks.
-    * ``last_radps``: commanded rate before the previous step, whose effect may continue.
+    * ``last_radps``: commanded rate before the previous step, which may not have settled.
     * ``last_ticks``: time from the previous onset to this onset.
     """
 

@@ -85,7 +85,8 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 def motor_in_loop(gains: Gains) -> Turned:
     """Return a function that gives the step response of a motor in the manual's control loop.
 
-    Its parameters: PWM steps for a speed of one count per tick, time constant and delay in s.
+    The returned function's parameters: PWM steps for one count per tick, time constant and delay
+    in s.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

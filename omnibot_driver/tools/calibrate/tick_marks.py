@@ -20,8 +20,8 @@ LARGEST: Final = 0.5
 """Largest plausible relative error of a time between ticks. A larger error shows a missed edge of
 the encoder's signal."""
 OUTLIER: Final = 4.5
-"""Largest relative error of a time between ticks, in standard deviations, that is used. The
-standard deviation is estimated from the median magnitude of all errors."""
+"""Relative error of a time between ticks, in standard deviations, above which the time is ignored.
+The standard deviation is estimated from the median magnitude of all errors."""
 EXPLAINED: Final = 0.4
 """Smallest fraction of the variance that fitted marks must explain. For evenly spaced marks, the
 fraction is below 0.2 (test with three records of two turns each)."""
@@ -99,7 +99,7 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return, for each mark, the relative error of the distance to the next mark.
 
-    * ``rows``: for each record, the relative errors of its times between ticks.
+    * ``rows``: for each record, the relative errors of the times between its marks.
     * ``firsts``: for each record, the number of its first mark.
     """
     of = np.concatenate(

@@ -43,8 +43,7 @@ class Behaviour:
     * ``rise_s``: rise time, from 10 % to 90 % of a step of the command.
     * ``overshoot``: as a fraction of the step.
     * ``command_error_s``: integral of the absolute error after a step of the command by 1.
-    * ``load_error_s``: the same after a step of the load as large as the effort for one count per
-      tick.
+    * ``load_error_s``: the same after a step of the load by ``Motor.pwm_per_count``.
     * ``ms``: peak of the sensitivity; 1 is best.
     * ``stable``: whether the errors have decayed at the end of the simulation.
     """

@@ -107,7 +107,7 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     def way(share: float) -> float:
         """Return how many counts the wheel turns in ``share`` ticks if it starts from rest.
 
-        ``share``: 0 to 3, not necessarily whole. The effort is constant, and its final speed is one
+        ``share``: 0 to 3, not necessarily whole. The constant effort gives a final speed of one
         count per tick.
         """
         return float(share - lag * (1.0 - np.exp(-share / lag)))

@@ -87,7 +87,7 @@ class Release(ModalScreen[bool]):
         )
 
     def on_key(self, event: events.Key) -> None:
-        """Close the question, and release the e-stop if the key is y."""
+        """Close this screen, and release the e-stop if the key is y."""
         event.stop()
         self.dismiss(event.key == "y")
 

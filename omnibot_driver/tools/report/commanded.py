@@ -13,7 +13,8 @@ YAW_WEIGHT_M: Final = 0.143
 WHEEL_WEIGHT_M: Final = 0.029
 """Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
 
-The OmniBot's factors are good enough to detect motion, and to weight the axes, of all robots.
+The OmniBot's factors are used for all robots. They are good enough to detect motion and to weight
+the axes.
 """
 
 

@@ -16,10 +16,8 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Age of the log's last state, in s, above which a report of this state proves a running driver.
-
-If /diagnostics has no such report, and the state is "disconnected", the driver had ended.
-"""
+"""Time in s after a log's last change of state. If /diagnostics shows this state even later, the
+driver was still running. Otherwise, the state "disconnected" means that the driver had ended."""
 
 
 def judge(log: Log) -> Iterator[Finding]:

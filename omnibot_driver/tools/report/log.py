@@ -146,8 +146,8 @@ class Log:
     def two_wheels(self) -> bool:
         """Whether the robot has two driving wheels; False without joint_states.
 
-        A Fejemis has two driving wheels and an upright IMU. An OmniBot has three, and its IMU hangs
-        upside down.
+        With two driving wheels (Fejemis), the report expects an upright IMU; otherwise (OmniBot),
+        an IMU that hangs upside down.
         """
         return len(self.wheels) == 2
 

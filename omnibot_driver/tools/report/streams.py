@@ -33,7 +33,7 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * One robot: the last rate. Without a rate: NaN for two driving wheels, otherwise unchanged.
+        * One robot: the last rate. If unknown: NaN for two driving wheels, otherwise the OmniBot's.
         * Several robots: their common rate; NaN if the known rates differ, or if none is known.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]

@@ -40,8 +40,8 @@ class Steps:
 
     * ``way_m``, ``turned_rad``: distance and turn of the step; 0 for a leap.
     * ``off_m``, ``off_rad``: difference between the change of the pose and the motion by the twist.
-    * ``leap``: whether this difference is too large. A leap over a gap must also lead to the zero
-      pose.
+    * ``leap``: whether this difference is too large. Over a gap, only steps to the zero pose are
+      leaps.
     * ``reset``: whether the step is a leap to the zero pose.
     """
 
