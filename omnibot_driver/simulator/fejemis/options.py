@@ -42,9 +42,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--reverse",
         choices=get_args(Reverse),
         default="mirrored",
-        help="how the robot steers in a curve that it drives backward. mirrored (the default): with"
-        " the same angle as in the same curve driven forward. clamped: with an angle of at most 90"
-        " degrees",
+        help="the front wheel's angle for driving a curve backward. mirrored (the default): as for"
+        " driving the curve forward. clamped: at most 90 degrees",
     )
     for name, effect in _SWITCHES:
         parser.add_argument(f"--{name}", action="store_true", help=effect)
