@@ -27,9 +27,10 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether the text of an angle to the right (a negative angle) may contain a 6.
+    """Return whether the text of an angle to the right (negative) may contain a 6.
 
-    The result is True within 0.5° of −60° to −69°, and within 0.5° of −6°, −16°, −26° and so on.
+    The checksum can miss damage to such a text. The result is True within 0.5° of −60° to −69°, and
+    of −6°, −16°, −26° and so on.
     """
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
@@ -130,7 +131,7 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
 ) -> None:
     """For any sequence of angles, the board reads no angle beyond 90°.
 
-    A line with a checksum loses two characters, which the checksum does not show; a line without a
+    This also holds if a line with a checksum loses two characters unnoticed, or if a line without a
     checksum loses one.
     """
     summed, plain = AngleRelay(), AngleRelay()

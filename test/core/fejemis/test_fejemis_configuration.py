@@ -254,7 +254,7 @@ def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
-    """The user's setting for checksums is wrong. So the driver accepts only heartbeats.
+    """The user's setting for checksums is wrong, so the driver rejects all lines except heartbeats.
 
     A notice says that the heartbeats contradict the setting.
     """

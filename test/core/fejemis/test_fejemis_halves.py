@@ -215,8 +215,8 @@ def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
 ) -> None:
     """One board is silent, or both are drive boards.
 
-    After 5 s, Stop is sent only with each try to start the boards, twice a second; with the e-stop,
-    20 times a second.
+    After 5 s, the driver sends Stop only twice a second, when it tries to start the boards. With
+    the e-stop, the driver sends Stop 20 times a second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks

@@ -48,8 +48,8 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: the gyro line and the acceleration line come with each sample. All other lines come
-    only with samples of odd numbers (True) or of even numbers (False).
+    ``odd``: whether the samples with all lines have odd numbers (True) or even numbers (False). The
+    other samples have only the gyro line and the acceleration line.
     """
 
     order: str

@@ -152,9 +152,10 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return, for each published sample, the cycles of its gyro line and acceleration line.
+    """Return the cycle numbers of the gyro line and acceleration line of each published sample.
 
-    Each cycle is given as its number divided by 1000. ``bench`` must be a result of ``numbered``.
+    The numbers are divided by 1000. ``bench`` must be a result of ``numbered``, whose lines contain
+    these numbers.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))

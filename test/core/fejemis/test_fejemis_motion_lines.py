@@ -62,8 +62,8 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
     """The manual's example of a motion line loses two characters.
 
-    The checksum still fits, but the line commands another motion; so the driver sends this motion
-    with other digits.
+    The checksum still fits, but the line commands another motion. So the driver writes the
+    example's motion with other digits.
     """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
@@ -115,10 +115,9 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A stop line and the next line together lose two characters.
+    """A stop line and the next line together lose two characters. No false motion is read.
 
-    No false motion is read: an empty line keeps the next line's checksum out of the stop line
-    (``rc 2 0 092``).
+    An empty line between them keeps the next line's checksum out of the stop line (``rc 2 0 092``).
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -255,7 +254,7 @@ def test_without_sums_the_drive_board_gets_the_speed_of_the_outer_wheel() -> Non
 def test_without_sums_a_whole_speed_keeps_its_decimal_point() -> None:
     """The speed 1 m/s is written as ``1.``, so the line is ``rc 2 1. 0``.
 
-    Without its last space, the line has the same speed, ``1.0``.
+    If the line loses its last space, the speed is still ``1.0``.
     """
     assert plain_drive_line(1.0, 0.0) == b"rc 2 1. 0"
     assert plain(b"rc 2 1.0\n") == [(2.0, 1.0, 0.0)]

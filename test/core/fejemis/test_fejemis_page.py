@@ -228,10 +228,10 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """The driver sends each used command of the table as in its example line.
+    """The driver sends each used command in ``SAID`` as in its example line.
 
-    Only ``motv`` (lift) may have other numbers. Unused and replaced commands are never sent:
-    ``setid`` can erase the board.
+    Only ``motv`` (lift) may have other numbers. Unused and replaced commands are never sent; one of
+    them, ``setid``, can erase the board.
     """
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden

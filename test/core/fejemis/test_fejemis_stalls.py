@@ -98,7 +98,7 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
     """The driver stalls, then reads late twice. The published samples have their sampling times.
 
-    The terminal loses bytes between the two late reads. Only a sample between the lost bytes and
+    The terminal's full buffer loses bytes in the stall. Only a sample between the lost bytes and
     the next pose is not published.
     """
     bench = nominal()

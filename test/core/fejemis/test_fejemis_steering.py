@@ -88,7 +88,7 @@ def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: fl
 @pytest.mark.slow
 @given(speeds, rates)
 def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
-    """The front wheel is at its commanded angle. The set-points then give the commanded motion."""
+    """If the front wheel is at its commanded angle, the set-points give the commanded motion."""
     assume(outer_mps(BodyTwist(v, 0.0, w), 0.4) > 1e-3 and v >= 0.0)
     factor = scale(BodyTwist(v, 0.0, w), 0.4)
     theta_rad = math.atan2(0.5 * factor * w, factor * v)

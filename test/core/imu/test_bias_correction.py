@@ -244,7 +244,7 @@ def test_the_figures_count_what_happened() -> None:
 def test_a_calibration_ends_when_the_estop_is_latched() -> None:
     """If the e-stop is latched during a calibration, the calibration fails.
 
-    Then the user calls another calibration, while the e-stop is still latched. This one succeeds.
+    A calibration that begins later, under the latched e-stop, succeeds.
     """
     bench = running()
     bench.session.calibrate_gyro("token", bench.now)

@@ -109,8 +109,8 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """The board's clock jumps by ``leap_s``.
 
-    The delay of the next tick report, which is usually 0, then becomes −``leap_s``, and is reported
-    as irregular.
+    By this clock, the next tick report has a delay of −``leap_s`` instead of about 0. The driver
+    regards this delay as irregular.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

@@ -2,7 +2,7 @@
 
 """Tests of the period with which the board sends the GPS date, and of requests for one date.
 
-The driver requests one date to confirm the board's settings. This ends the periodic dates.
+The driver requests one date to confirm the board's settings. This request ends the periodic dates.
 """
 
 import pytest

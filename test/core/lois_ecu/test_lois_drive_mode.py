@@ -40,8 +40,8 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
     """The user changes to duty mode in a forward drive, and then drives backward.
 
-    The odometry moves backward: the driver clears the RPM target, with which the public firmware
-    counts all ticks as forward.
+    The odometry moves backward, because the driver clears the RPM target. The public firmware
+    counts all ticks as forward while this target is forward.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)

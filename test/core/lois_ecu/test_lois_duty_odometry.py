@@ -44,7 +44,8 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
 def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_scale() -> None:
     """In a drive by duty just after Stops, the covariance includes the error of ``duty_scale``.
 
-    Its standard deviation is 30 % for each wheel. Stops, which are duties of 0, do not reduce it.
+    This error has a standard deviation of 30 % for each wheel. Stops, which are duties of 0, do not
+    reduce the error.
     """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
     assert bench.written[-1][1].startswith(b":0100000000")

@@ -73,7 +73,7 @@ def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
 
 @pytest.mark.parametrize("gap_s", [0.6, 0.75])
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
-    """In a steady drive, no reports arrive for less than 1 s.
+    """In a steady drive, all reports are lost for up to 0.75 s.
 
     This gap adds less than 10° to the heading's standard deviation, and the heading's error is
     below 10°.
@@ -148,9 +148,9 @@ def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
 def test_a_large_correction_by_the_heading_of_0x20_is_not_exact(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a large correction by the board's heading (0x20), the covariance includes an error.
+    """The covariance includes the error of a large correction by the board's heading (0x20).
 
-    A linear filter cannot follow starting wheels exactly.
+    This correction is not exact, because a linear filter cannot follow starting wheels exactly.
     """
 
     def stddev_deg() -> float:

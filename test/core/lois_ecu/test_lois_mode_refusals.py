@@ -88,7 +88,7 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
     """The user changes the drive mode and the terminal mode, and takes the terminal mode back.
 
-    The driver still stops the robot for the drive mode, and refusals name only the drive mode.
+    The driver still stops the robot to change the drive mode. Refusals name only the drive mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

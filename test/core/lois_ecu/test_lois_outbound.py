@@ -130,7 +130,7 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
     """If a Stop and a later setting lose 14 adjacent characters, the rest can command full duty.
 
-    The reverse order is safe, so only a setting after a set-point must wait (15 ms).
+    So a setting after a set-point, such as Stop, must wait (15 ms). The reverse order is safe.
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))

@@ -98,8 +98,8 @@ def test_another_speed_ends_the_rest() -> None:
 def test_a_fall_that_was_not_told_is_seen() -> None:
     """The driver estimates 28 RPM for a wheel, and then the board reports 14 RPM three times.
 
-    The detector is certain of the wheel's rest: the board repeats the last speed of a stopped
-    wheel.
+    After this fall, the repeated speed proves the wheel's rest: the board repeats the last speed of
+    a stopped wheel.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -120,9 +120,9 @@ def test_a_fall_in_gaps_between_reports_is_seen() -> None:
 
 
 def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
-    """If most reports are lost, a fall of only 6 RPM shows that the wheel is probably at rest.
+    """If most reports are lost, a wheel whose reported speed falls by 6 RPM is probably at rest.
 
-    The fall may have begun in a gap.
+    This small fall may be the end of a larger one that began in a gap.
     """
     assert told(17, 17, 16, 12, 12, every_s=GAP_S).chance < 0.2
     assert told(19, 18, 18, 12, 12, every_s=GAP_S).chance > 0.5
@@ -130,9 +130,9 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """Most reports are lost, perhaps also the fall to the speed from which a wheel has stopped.
+    """If most reports are lost, eleven equal speeds make the detector certain of a wheel's rest.
 
-    Eleven equal reports make the detector certain of the wheel's rest; without losses, they show no
+    The reports of the wheel's slowing down may be lost. Without losses, equal speeds alone show no
     rest.
     """
     speeds = (13, 13, 13, 14)

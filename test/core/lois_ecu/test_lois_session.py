@@ -186,8 +186,7 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
     """For 1.2 s the board sends only a record. The state stays nominal, and the record is complete.
 
-    The record has 1024 samples. The wheels have 120 encoder ticks per turn, so the samples are soon
-    recorded.
+    The record has 1024 samples, one for each encoder tick. A wheel has 120 ticks per turn.
     """
     bench = Bench(firmware, LoisEcuSettings(ticks_per_revolution=120), steps=120)
     bench.drive_on(0.6, 2.0)

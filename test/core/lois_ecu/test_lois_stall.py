@@ -101,17 +101,17 @@ def looks_stalled(
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
     """A wheel whose reported speed never changes while the other wheel ticks looks stalled.
 
-    The firmware's pose does not show that this wheel turns: the firmware computes the pose from the
-    old speed.
+    The firmware computes its pose from the old speed, so the pose does not prove that the wheel
+    turns.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
 
 
 def test_a_few_equal_speeds_on_a_bad_line_do_not_show_a_stall() -> None:
-    """Most reports are lost, and the board reports the same speed of a wheel for 3 s.
+    """Most reports are lost. A wheel with seven equal reported speeds in 3 s does not look stalled.
 
-    The driver regards the wheel as stalled only after three more equal reports.
+    After ten equal speeds, the wheel looks stalled.
     """
     assert not looks_stalled([(-10, 8 + step % 3) for step in range(7)], every_s=0.5)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(10)], every_s=0.5)
@@ -154,7 +154,8 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
     """The odometry assumes a wheel at rest, but the board reports a speed above the set-point.
 
-    The wheel looks stalled: at this speed, the speed controller gives it no power to start.
+    The wheel looks stalled: the speed controller uses the reported speed, so the wheel gets no
+    power to start.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))

@@ -79,9 +79,9 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode, which has overwritten a factor of the wheel speed.
+    """The user ends a terminal mode, which has overwritten a setting of the board.
 
-    The driver restores this factor (left short correction), and reports the end of the mode once.
+    The driver restores this setting (left short correction), and reports the end of the mode once.
 
     ``hears``: whether lines reach the board in the first 1.3 s.
     """

@@ -59,8 +59,8 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
 def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
     """The driver writes the settings on a line that loses 1 % of the bytes.
 
-    The left short correction (a speed factor), which the mode line sets to almost 0, is right after
-    each writing.
+    The mode line sets a speed factor (left short correction) to almost 0. Each writing of the
+    settings restores this factor.
     """
     rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
     rig.run(6.0)

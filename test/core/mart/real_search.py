@@ -67,15 +67,16 @@ ENDS_S, SETTLED_S = 16.0, 1.5
 class Trial(NamedTuple):
     """One run of the search, of one of two kinds.
 
-    * With ``wishes``: a user gives these commands, and one datagram is disturbed.
-    * Without ``wishes``: the driver starts while the server executes ``met``, and the network is
-      interrupted.
+    * With user commands (``wishes``): one datagram is disturbed.
+    * Without user commands: the driver starts while the server executes a command (``met``), and
+      the network is interrupted.
 
     Attributes:
 
+    * ``wishes``: names of the user commands, from ``WISHES``.
     * ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
-    * ``number``: the disturbed datagram's number in that direction, from 0, without regular queries
-      and their replies.
+    * ``number``: the disturbed datagram's number in that direction, from 0. Regular queries and
+      their replies are not counted.
     * ``fate``: what happens to this datagram.
     * ``met``: command that the server is executing when the driver starts; empty for none.
     * ``away_s``: duration in s of the first interruption, which begins when the driver starts.
@@ -187,7 +188,7 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials of one sequence of user commands, each with one disturbed datagram.
 
     In each direction, only the first datagrams are disturbed: at most ``MOST_DATAGRAMS`` for each
-    command. Each of them meets every fate in ``FATES``.
+    command. Each of these datagrams has one trial for each fault in ``FATES``.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

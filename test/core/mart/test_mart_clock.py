@@ -67,8 +67,8 @@ def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
     """The user sets the server's clock back between two drives.
 
-    The second drive needs two starts (RM), because the first makes the server report an unusable
-    heading. One notice names the clock.
+    RM computes the heading by this clock, so the second drive begins with an unusable heading and
+    needs a second RM. One notice names the clock.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

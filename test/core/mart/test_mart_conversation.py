@@ -298,9 +298,9 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """The reply with the angle of a turn is in fact an old encoder count, 3.
+    """The reply to a turn gives an angle of 3°, which contradicts the encoder.
 
-    A turn of 3° contradicts the encoder, so the odometry computes the turn from the encoder alone.
+    The 3 is in fact an old encoder count, so the odometry computes the turn from the encoder alone.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

@@ -310,9 +310,9 @@ def with_swapped_pieces(bench: MartBench) -> None:
 
 
 def test_a_file_whose_pieces_were_swapped_is_not_saved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A download with two swapped full pieces fails, and the next one succeeds.
+    """A job downloads a file twice, and fails because the contents differ. The next job succeeds.
 
-    The driver downloads the file twice, and the contents differ.
+    In one of the first two downloads, two full pieces are swapped.
     """
     monkeypatch.setattr(FileNote, "content", FIRST + SECOND + b"end")
     bench = MartBench().ready()

@@ -47,7 +47,7 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
     """The server rejects one RM (forward drive), and obeys the next; later, the robot is pushed.
 
-    The driver allows motion, and does not suspect a server that rejects RM but moves the robot.
+    The driver allows motion: it does not take the push for a motion by the rejected RM.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58

@@ -99,7 +99,7 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
     """Another program stops the robot. The server rejects the next change of speed (RMCS).
 
-    The driver reports that another program may be the cause, and the robot drives on.
+    The driver names another program as a possible cause, and starts the robot again.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 2.0)

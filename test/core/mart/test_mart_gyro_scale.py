@@ -89,7 +89,8 @@ def test_a_new_scale_during_a_curve_is_not_a_turn() -> None:
 def test_the_scale_of_angles_is_that_of_the_gyro_and_leaves_the_track_alone() -> None:
     """The user sets ``odom_angular_scale`` and inverts the heading.
 
-    The angles of the gyro are scaled. The track, by which the right wheel measures angles, is not.
+    The angles of the gyro are scaled. The track width, which angles from the encoder need, stays
+    the same.
     """
     values = mart.PARAMETERS.check_all({"odom_angular_scale": 1.05, "heading_inverted": True})
     settings = mart.settings(values)

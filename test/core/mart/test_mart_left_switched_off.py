@@ -67,7 +67,7 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
     """RST IMU (IMU check) is lost, and a copy of the reply to MSM (end of direct control) arrives.
 
-    The driver does not take the copy for a working IMU, so no SRM (stop) hangs the server.
+    The copy does not count as the reply to RST IMU; otherwise, SRM (stop) would hang the server.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -144,8 +144,8 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the state of the server, with fixed values for what the test cannot compare.
 
-    A waiting command port looks like a hung one. In both cases, motion and ``released`` are
-    unknown.
+    A waiting command port counts as hung. With a hung port, the motion counts as none, and
+    ``released`` as False.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

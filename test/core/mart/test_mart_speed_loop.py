@@ -94,7 +94,7 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """The driver measures one noisy speed of a motor again and again in a long straight drive.
+    """In a long straight drive, the driver measures one noisy speed of a motor again and again.
 
     The computed units for another, lower speed change by at most 3.
     """

@@ -123,9 +123,9 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
-    """A knock changes one reading. A single changed bit cannot cause a change of this amount.
+    """A knock changes one reading by an amount that no single wrong bit can cause.
 
-    So the filter releases the reading at once.
+    The filter releases this reading at once.
     """
     readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
@@ -156,7 +156,7 @@ def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
 def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
-    """A shock rings in one axis for several readings. All of them are released."""
+    """A shock rings in one axis for several readings. The filter rejects none of them."""
     readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
     through = gate()
     assert list(chain(*admitted(readings, through))) == readings
@@ -184,8 +184,8 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
     """A displacement faster than 2 m/s or 8 rad/s is rejected.
 
-    The next displacement counts the rejected one as lost, together with the losses that both
-    reported.
+    The next displacement's ``lost`` counts the rejected one, and adds the ``lost`` of both
+    displacements.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -216,9 +216,9 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """One displacement jumps in speed, and the next one is fast, too; a pose comes in between.
+    """After slow displacements come a fast one, a pose, and another fast displacement.
 
-    The filter holds the first displacement and the pose until the second displacement comes.
+    The filter holds the first fast displacement and the pose until the second confirms the speed.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)

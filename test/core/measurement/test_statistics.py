@@ -49,7 +49,7 @@ def test_a_restart_after_a_pause_counts_only_if_lost_deltas_do_not_explain_it(
 ) -> None:
     """The board restarts, or is paused and started again; the first delta afterwards is lost.
 
-    The driver counts a restart only in the first case: a pause and a lost delta explain the next
+    The driver counts only the restart: a pause and a lost delta explain the next delta's sequence
     count.
     """
     bench = Bench(BoardSettings(running=True))

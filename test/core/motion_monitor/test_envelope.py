@@ -141,9 +141,9 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """A held robot's wind-up grows by 1.2 times the distance that the robot falls behind.
+    """The wind-up is the distance that a held robot may catch up later.
 
-    The wind-up is the distance that the robot may catch up later. The wind-up is limited, and
+    The wind-up grows by 1.2 times the distance that the robot falls behind, up to a limit, and
     shrinks in normal motion.
     """
     wind_up = WindUp()
