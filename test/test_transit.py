@@ -282,10 +282,10 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """The offset of a sender's clock is unknown, and the sender's first message took 0.5 s.
+    """A sender's first message takes 0.5 s. The offset of the sender's clock is unknown.
 
-    For the second message, the driver returns two sending times: by the driver's clock, 0.5 s too
-    late; by the sender's clock, right.
+    For the second message, the driver returns two sending times. The estimate by the driver's clock
+    is 0.5 s too late. The time by the sender's clock is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -297,7 +297,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
     """The sender's clock is an hour behind. After ten messages, the driver knows this difference.
 
-    The driver now returns the time of sending only by its own clock, and this time is right.
+    The driver then returns one sending time, by its own clock. This time is right.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

@@ -135,10 +135,7 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
 
 
 def test_a_command_calls_no_more_than_it_did() -> None:
-    """The driver makes few Python calls from the bytes of a Twist to the packets for the board.
-
-    The test limits the number of these calls. The board is running.
-    """
+    """A Twist takes at most 46 Python calls, from its bytes to the packets for a running board."""
     session, board, now = opened_session(), SimulatedBoard(BoardSettings(running=True)), 0.0
     for tick in range(SETTLED):
         now = tick * TICK_S

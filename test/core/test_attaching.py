@@ -157,7 +157,8 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
     """One pose with an unexpected heading changes nothing.
 
-    Two such poses in a row show a new earth frame. Odom then continues without a jump.
+    Two such poses in a row show that the board's coordinate frame has changed. Odom then continues
+    without a jump.
     """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)

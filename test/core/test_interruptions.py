@@ -65,7 +65,7 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
     """The board restarts, so SEQ and its pose begin at zero. Odom continues from its last pose.
 
-    ``hidden``: the first two bytes of each type of frame that is lost during the restart.
+    ``hidden``: the types of frames that are lost during the restart, by their first two bytes.
     """
     on = line(seed)
     on.drives = False
@@ -90,8 +90,8 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
     """A paused board restarts at rest, and the driver misses its frames for 4 s.
 
-    So the first count is larger than the last count before the restart. Odom does not move to the
-    new origin.
+    The first delta that arrives has a higher count than the last delta before the pause. Odom does
+    not move to the new origin.
     """
     on = line(0, frame=frame)
     on.drives = False

@@ -198,9 +198,9 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 @pytest.mark.parametrize("connected_s", [0.1, 0.25])
 def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: float) -> None:
-    """A board sends the first «Paused» text of a connection after the driver's R (reboot) was lost.
+    """The driver's R (reboot) is lost. Then the board sends the connection's first «Paused» text.
 
-    Without an earlier number to compare, the text does not show a restart, so the reset fails.
+    With no earlier text to compare, this text does not show a restart. The reset fails.
     """
     bench = Bench(run=False)
     bench.open()

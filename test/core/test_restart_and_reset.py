@@ -58,8 +58,7 @@ def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -
 def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertainty() -> None:
     """If the first pose after a gap of 1.6 s shows a restart, odom keeps its pose.
 
-    Its uncertainty is small: only the distance and turn in which the robot came to rest are
-    uncertain.
+    The uncertainty of odom is small: only the robot's motion until it came to rest is unknown.
     """
     odometry, estimates = driven(75, 0.014)
     for number in range(115, 120):
@@ -78,10 +77,10 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     ambiguous: bool, told_m: float, x_m: float
 ) -> None:
-    """After a gap, a board's pose at the origin shows a restart if the counters allow one.
+    """After a gap, a board's pose at the origin shows a restart. Odom does not move.
 
-    Odom then does not move. If the counters exclude one, or if the pose is 1 cm off, odom moves to
-    the pose.
+    If the counters exclude a restart, or if the pose is 1 cm from the origin, odom moves to the
+    pose.
     """
     odometry, estimates = driven(75, 0.004)
     for number in range(127, 177):

@@ -39,7 +39,10 @@ ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
-"""Number of drivers that perform each group of stops in ``LIVES``, on a line that loses bytes."""
+"""Number of drivers on a lossy line for each pair of stops in ``LIVES``.
+
+Each driver performs both stops of a pair, for example a timeout and ctrl-C.
+"""
 LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
 BUSY: Final = ("busy_computer", ())
@@ -207,7 +210,7 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test how the robot stops if the line loses bytes on the way to the board.
 
-        ``number_of_life``: index in ``LIVES`` of the stops that each driver performs.
+        ``number_of_life``: index of a pair of stops in ``LIVES``. Each driver performs both stops.
 
         ``numbers``: one seed for each driver, for the board's settings and the losses.
         """

@@ -20,7 +20,7 @@ def _ros() -> Iterator[None]:
 def lenience() -> dict[str, float]:
     """Return values of ``grace_s``, ``ends_within_s`` and ``rest_s`` (s) for a busy computer.
 
-    Within ``rest_s``, a driver that does not stop the robot would send six commands.
-    ``make faults`` uses the defaults of ``Rig`` instead.
+    ``rest_s`` is long enough to find a driver that does not stop the robot: such a driver sends
+    six commands in this time. ``make faults`` uses the defaults of ``Rig`` instead.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.3}

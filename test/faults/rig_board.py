@@ -45,8 +45,8 @@ class RigBoard:
 
     ``sent``: returns the frames of the board's last tick.
 
-    ``not_sent``: returns, for each kind of message, its name, the number of published messages that
-    the board has not sent, and the number of all published messages.
+    ``not_sent``: returns one tuple for each kind of message: the name of the kind, the number of
+    published messages that the board has not sent, and the number of all published messages.
 
     ``lossy``: returns the settings of the n-th board behind a lossy line.
 

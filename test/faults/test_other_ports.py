@@ -41,7 +41,7 @@ def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
 
 
 def test_the_network_publishes_only_what_was_sent(network: NetworkRig) -> None:
-    """During the other tests, the driver has published only messages that the board has sent."""
+    """During the other tests, the driver has published only data that the board has sent."""
     network.judge_stream()
     assert not network.findings.take(), network.driver.output
     assert network.findings.published > 50

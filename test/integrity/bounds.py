@@ -48,10 +48,10 @@ class Bound:
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
-        """Return the least share of the intact frames that must be decoded with this chunking.
+        """Return the share of the intact frames that must be decoded with this chunking.
 
-        For a chunking in ``BUSY_LOOPS``, the share is at most 0.999, because both the adapter and
-        the reader are late.
+        For a chunking in ``BUSY_LOOPS``, no more than 0.999 is required, because both the adapter
+        and the reader are late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 

@@ -15,13 +15,13 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-After a larger skip, the frames may be equal by chance, so the next decoded frame of the read (if
-any) must confirm the match.
+After a larger skip, a true frame may equal the decoded frame by chance. The next decoded frame of
+the read (if any) must then confirm the match.
 """
 REACH_BYTES = 600
-"""How far before a read the judge begins to search for the frames of the read, in received bytes.
+"""The search for the frames of a read begins this number of received bytes before the read.
 
-The judge goes back by another 300 bytes of the sent stream.
+In the sent stream, the search begins another 300 bytes earlier.
 """
 
 

@@ -18,12 +18,12 @@ from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 
 @dataclass(frozen=True, slots=True)
 class Understood:
-    """What a receiver understands of the writes of a course if no byte is damaged.
+    """What a receiver understands of the driver's writes in a scene if no byte is damaged.
 
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the next write that is unlike it, or the number of
-    writes if there is none.
+    ``alike_until``: for each write, the index of the next special write, or the number of writes. A
+    special write begins or ends a motion, waits for an earlier write, or is misunderstood.
     """
 
     held: list[bytes]

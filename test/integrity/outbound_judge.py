@@ -152,7 +152,9 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """Record a letter on which the board acts. Return "false letter" if it is false, else "".
+        """Record a letter on which the board acts. Return "false letter" or "".
+
+        A letter is false if the driver wrote this byte, but not as a letter.
 
         ``at``: position of the letter in the write; negative if faults of the line have added or
         changed the letter.

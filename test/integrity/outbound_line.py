@@ -25,8 +25,8 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """The damaged line of one trial.
 
-    ``whole``: number of bytes before the next fault. For a write of at most ``whole`` bytes, the
-    caller may subtract the write's length from ``whole`` instead of calling ``carry``.
+    ``whole``: number of bytes before the next fault. A write of at most ``whole`` bytes arrives
+    undamaged. The caller may subtract its length from ``whole`` instead of calling ``carry``.
     """
 
     whole: int

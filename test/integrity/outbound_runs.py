@@ -25,10 +25,10 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. The commands differ from script to script."""
 NEEDED: Final = 10_000
-"""Minimum number of trials of all scenes in ``ENDED``, for each receiver and rate of lost bytes.
+"""Minimum number of trials with a stop, for each receiver and rate of lost bytes.
 
-The scenes share the trials equally. With 1 byte in 100 lost, each scene in ``HURRIES`` has
-``NEEDED`` trials.
+The scenes in ``ENDED`` share the trials equally. With 1 byte in 100 lost, each scene in
+``HURRIES``, for example "e-stop", has ``NEEDED`` trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -69,7 +69,10 @@ def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
 
 
 def trials(fault: str, scene: str) -> int:
-    """Return the number of trials of each script with this fault, for each receiver."""
+    """Return how often each script of ``scene`` runs with this fault and each kind of receiver.
+
+    A script is one sequence of commands.
+    """
     if fault in OTHERS:
         return OTHER_TRIALS
     if scene in DRIVES:

@@ -37,7 +37,8 @@ Memo = dict[tuple[bytes, bool, bytes], Made]
 
 * Key: the bytes that the receiver held before, whether the line was idle, and the new bytes.
 * Value: the bytes held afterwards, and the frames found, each with the position of its last byte.
-* Value ``None``: a letter was found, so the new bytes must be processed one by one.
+* Value ``None``: the receiver found a letter, which may change the board's mode. So the new bytes
+  must be processed one by one.
 """
 
 

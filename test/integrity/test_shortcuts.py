@@ -81,7 +81,7 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 
 
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
-    """Return about one in ``number`` of the combinations that have one choice from each list.
+    """Return a sample of all combinations of one choice from each list: about one in ``number``.
 
     With three or more lists of at least ``number`` choices each, every pair of choices from two
     different lists occurs.

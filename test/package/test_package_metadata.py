@@ -163,7 +163,7 @@ def test_manifest_and_setup_agree(setup_arguments: dict[str, Any]) -> None:
 
 
 def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any]) -> None:
-    """The extras for pip have only libraries that the driver itself does not need."""
+    """``setup.py`` declares optional libraries as extras for pip. The driver does not need them."""
     assert setup_arguments["extras_require"] == {**EXTRAS, "test": ["pytest"]}
 
 

@@ -23,12 +23,12 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""Number of deltas to search in each direction for the delta that matches a message.
+"""Number of earlier and of later deltas to search for the delta that matches a message.
 
 The search begins at the delta that fits the message's timestamp.
 """
 LONGEST_STALL = 1000
-"""Number of frames to search in each direction for the IMU frame that matches a message.
+"""Number of earlier and of later frames to search for the IMU frame that matches a message.
 
 After a stall, the frame may be far from the message's timestamp.
 """

@@ -167,7 +167,8 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 ) -> None:
     """The computer is suspended while the robot drives. Afterwards, the driver stops the robot.
 
-    The driver detects a stall: the clock of the command timeout does not count the suspension.
+    The driver detects the suspension as a stall. The command timeout cannot detect it, because its
+    clock does not run during the suspension.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(

@@ -54,8 +54,8 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 ) -> None:
     """The board restarts, or the host stalls, on a line with an FTDI adapter.
 
-    The errors of 99 % of the stamps stay within 0.5 ms of one offset. The first 2 s after a start
-    are left out.
+    99 % of the stamps have the same error to within ±0.5 ms. The first 2 s after a start are left
+    out.
     """
     stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, skew, 0, 20.0, event)
     assert stamped.unevenness() < 0.2e-3
@@ -65,7 +65,7 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
     """If an FTDI timer cuts no frame in two, all stamps are late by one frame's duration ±0.5 ms.
 
-    Without a cut frame, the driver assumes the middle of the timer's possible phases.
+    Only a cut frame would show the timer's phase more exactly.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within

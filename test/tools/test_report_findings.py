@@ -233,7 +233,7 @@ MART = {"Odometry rate (Hz)": "4.9 of 5", "Published odometry (Hz)": "20"}
 def beside(drive: Drive, *streams: dict[str, str]) -> Log:
     """Return the log of ``drive``, recorded while other robots published too.
 
-    ``streams``: for each robot, the values of its diagnostics "Stream".
+    ``streams``: for each robot, the keys and values of its diagnostic status "Stream".
     """
     drive.statuses[:] = [(1.5, "omnibot_driver: Stream", 0, "complete", one) for one in streams]
     return replace(drive.log(), alone=False)
@@ -279,7 +279,7 @@ def test_the_imu_of_another_robot_is_not_expected(
 ) -> None:
     """A bag of two robots has no IMU messages. The finding depends on which robots have an IMU.
 
-    * Both have one, or a topic of this robot is for an IMU: BAD.
+    * Both have one, or a topic shows that the judged robot has one: BAD.
     * Only one has one, and no topic shows which: NOTE.
     * Neither has one: no finding.
     """

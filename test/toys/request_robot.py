@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated robot of the toy board with requests."""
+"""The simulated robot of the toy board that obeys requests over UDP."""
 
 import argparse
 

@@ -300,7 +300,7 @@ def test_an_answer_is_read_although_the_name_has_another_address(
 def test_a_lookup_that_ends_after_an_answer_is_not_used(names: Names, named: UdpPorts) -> None:
     """A host answers while its name is looked up. Then the lookup finds another address.
 
-    This address is not used. When the host is silent again, the port stays open until the next
+    The port ignores this address. It stays open even if the host falls silent again, until a new
     lookup has ended.
     """
     names.wait_for(1, named)

@@ -40,10 +40,9 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """``rolled`` is the sum of all displacements of the robot, in the robot's own axes.
+    """``rolled`` sums all displacements in the robot's axes, whichever axes the board uses.
 
-    A conversion of ``rolled`` to wheel angles and back keeps the yaw angle. The board reports in
-    the earth's or the robot's axes.
+    A conversion of ``rolled`` to wheel angles and back keeps the yaw angle.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):

@@ -201,7 +201,7 @@ def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> No
 
 
 def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
-    """The robot drives 2 m forward, and 2 m back, each time after a restart with an unknown turn.
+    """The robot drives 2 m forward, then 2 m back. A restart before each drive hides a turn.
 
     The errors of the two drives do not cancel, so x is uncertain by more than 1 m.
     """
@@ -286,9 +286,9 @@ def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(fram
 def test_a_loss_that_a_pose_shows_before_the_frame_is_known_is_bridged(
     frame: str, missing: int
 ) -> None:
-    """The odometry estimates lost motion even if only the board's first or second pose shows it.
+    """A displacement is lost before the heading of the board's coordinate frame is known.
 
-    The heading of the board's coordinate frame is not known before the second pose.
+    The odometry estimates the lost motion when the board's first or second pose shows the loss.
     """
     odometry, trip = Odometry(SETTINGS), Trip(0.3)
     estimates = []

@@ -107,10 +107,9 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """A «Paused» text shows an uninterrupted pause if the frame before it is a «Paused» text, too.
+    """Two «Paused» texts show an uninterrupted pause if their numbers show at most nine lost texts.
 
-    By the numbers in the texts, at most nine texts may be lost in between. Otherwise, the board may
-    have run.
+    If more texts are lost, or if a different frame comes in between, the board may have run.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]

@@ -111,7 +111,7 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
     """The words of a velocity frame are exactly the commanded numbers, if these are whole LSB.
 
-    The test leaves out velocities with harmful bytes, because the driver changes them.
+    The test omits words with the bytes of a letter or a header, because the driver changes them.
     """
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))

@@ -85,7 +85,7 @@ def test_all_frames_between_silences_come_in_any_chunks(
 @settings(max_examples=40)
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """A frame that is similar to the last one of its kind is returned with its last byte.
+    """A frame that is similar to the last one of its kind is returned when its last byte arrives.
 
     The only exception is a last byte that may begin a header.
     """

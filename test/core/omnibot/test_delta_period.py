@@ -113,8 +113,8 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
     """At the set rate of deltas, only the usual order of frames has no cost.
 
-    At 10 Hz, ten IMU frames come before a delta, and two deltas before a pose; at 25 Hz, four and
-    five.
+    At 10 Hz, ten IMU frames come before a delta, and two deltas before a pose. At 25 Hz, four IMU
+    frames come before a delta, and five deltas before a pose.
     """
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)

@@ -80,9 +80,10 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """25 IMU frames in a row show IMU-only mode. 24 do not: five deltas may have been lost.
+    """25 IMU frames in a row show IMU-only mode. 24 do not.
 
-    A delta follows every fourth IMU frame.
+    In nominal mode, a delta follows every fourth IMU frame. If five deltas are lost, 24 IMU frames
+    come in a row.
     """
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:

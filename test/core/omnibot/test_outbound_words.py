@@ -52,9 +52,9 @@ def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
 def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
     counts: tuple[float, float, float],
 ) -> None:
-    """A word with a harmful low byte is changed by one LSB, so it is off by at most 1.5 LSB.
+    """The driver changes a word by one LSB if its low byte could act as a letter or in a header.
 
-    From -20,479 to 20,479, only the low byte can be harmful.
+    So the word is off by at most 1.5 LSB. From -20,479 to 20,479, no high byte needs a change.
     """
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5

@@ -34,9 +34,9 @@ def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
 
 @given(counts, st.floats(0.0, 5.0))
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
-    """A delta that continues the count comes up to 5 s late, and the board sends no poses.
+    """A delta that continues the count comes up to 5 s late. The board sends no poses.
 
-    The driver counts no delta as lost, and does not assume a restart, which no pose could disprove.
+    The driver counts no delta as lost, and does not assume a restart.
     """
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
@@ -79,10 +79,10 @@ def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_boa
 def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """A board without poses is paused.
+    """A board that sends no poses is paused. Then a delta with the count n arrives.
 
-    The driver suspects a restart only if the next delta's count is low: a restart would mean no
-    more lost deltas than a continued count.
+    If the board has restarted, n deltas are lost. The driver suspects this only if at least n
+    deltas would be lost without a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -185,9 +185,9 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
 
 
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
-    """A repeated count does not show a wrap, so no delta is counted as lost.
+    """A false delta comes too early. The true delta, with the same count, follows.
 
-    A false delta comes too early. The true delta, with the same count, follows.
+    The driver does not take the repeated count for a wrap, so it counts no delta as lost.
     """
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)

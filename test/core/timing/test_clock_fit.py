@@ -51,7 +51,7 @@ def test_between_near_bounds_the_middle_is_taken() -> None:
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """For 8 s, both bounds of the ticks' times drift away from the true times by 0.1 ms/s.
+    """For 8 s, the lower and upper bounds for the ticks' times drift by 0.1 ms/s from the truth.
 
     Nevertheless, the error of the fitted clock stays below 0.5 ms.
     """

@@ -34,9 +34,9 @@ def steered_degrees(v: float, w: float) -> float:
 def test_the_body_moves_by_the_equations_of_the_manual(
     v: float, w: float, speed: float, turn: float
 ) -> None:
-    """``rc`` commands the velocities v and w, but the body moves with ``speed`` and ``turn``.
+    """``rc`` commands v and w. The robot moves with ``speed`` and ``turn``, as the manual says.
 
-    The manual's equations give ``speed`` and ``turn``. The values here were calculated by hand.
+    ``speed`` and ``turn`` were calculated by hand with the manual's equations.
     """
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)

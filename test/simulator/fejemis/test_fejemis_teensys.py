@@ -139,8 +139,8 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
     """While one half is silent, hung or unplugged, the other half sends, and the robot drives on.
 
-    Of the three, only a silent half still obeys commands. When the fault ends, the half sends
-    again.
+    A silent half still obeys commands; a hung or unplugged half does not. When the fault ends, the
+    half sends again.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)

@@ -24,7 +24,7 @@ STRAIGHT = 20
 
 
 def ticks_of_forward_targets(quirks: Quirks) -> bool:
-    """Return whether the board counts no ticks while it is commanded backward."""
+    """Return whether the board counts ticks only for forward commands, not for backward ones."""
     rig = Rig(quirks).booted()
     rig.drive(-STRAIGHT, -STRAIGHT, 4.0)
     return ticks_in(rig.run(1.0))[-1].left == 0

@@ -157,7 +157,7 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
 
 
 def terminal_passes_input_on(quirks: Quirks) -> bool:
-    """Return whether the board obeys fewer than 20 of 100 lines in compass mode.
+    """Return whether the board misses most lines in compass mode: it obeys fewer than 20 of 100.
 
     With this quirk, the board reads nothing while it forwards a line to the compass at 4800 baud.
     """

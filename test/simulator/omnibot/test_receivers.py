@@ -200,8 +200,8 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 def test_a_window_finds_a_header_within_a_frame() -> None:
     """The first word of a frame is -2 (FF FE), which is also the header of a second frame.
 
-    A receiver of the kind ``window`` finds both frames, a receiver of the default kind only the
-    first.
+    The receiver ``window`` keeps the bytes of a found frame, so it finds both frames. The default
+    receiver finds only the first frame.
     """
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))
@@ -229,7 +229,8 @@ def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
 def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None:
     """The first byte of the header FF FE comes twice.
 
-    The naive receiver discards both FF and misses the frame. It reads a letter in the payload.
+    The naive receiver discards both FF and misses the frame. A byte 0x52 in the payload then acts
+    as the letter R.
     """
     assert understood("FF FF FE 02 00 20 00 00 00 00", kind=NAIVE) == []
     assert understood("FF FF FE 02 00 52 00 00 00 00", kind=NAIVE) == [RESET]
