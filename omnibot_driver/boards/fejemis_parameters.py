@@ -136,10 +136,9 @@ DRIVING: Final = (
         10.0,
         "s",
         "Time from ~/power_off until the board cuts the power. This computer loses power too if"
-        " the board supplies it. The driver sends whole seconds. Some numbers could"
-        " lose two digits on the way to the board and still have a correct checksum. In place of"
-        " such a number, the driver sends a larger one: for example, 131 instead of 120. The answer"
-        " of ~/power_off states the time in use.",
+        " the board supplies it. The driver sends whole seconds. It increases the time (131 s"
+        " instead of 120 s) if a loss of two digits could leave a valid command with another time."
+        " The answer of ~/power_off states the time in use.",
         low=1.0,
         high=3600.0,
     ),

@@ -147,7 +147,7 @@ NOISE: Final = (
         "angular_velocity_stddev",
         0.00087,
         "rad/s",
-        "Standard deviation of one gyro sample (0.05 °/s rms), for the covariance.",
+        "Standard deviation of one gyro sample, for the covariance. The default is 0.05 °/s.",
         low=1e-6,
         high=100.0,
         calibrated=True,

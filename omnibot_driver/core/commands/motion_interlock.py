@@ -23,10 +23,10 @@ class Until(Enum):
         "Motion is refused until you send a zero command, or until no command arrives for"
         " `cmd_vel_timeout`"
     )
-    START = "Motion is refused until ~/start is called, because this is the second stop within 60 s"
+    START = "This is the second such stop within 60 s, so motion is refused until you call ~/start"
     ESTOP = (
-        "Motion is refused until the e-stop is latched and released, because this is the second"
-        " stop within 60 s"
+        "This is the second such stop within 60 s, so motion is refused until you latch and release"
+        " the e-stop"
     )
 
 

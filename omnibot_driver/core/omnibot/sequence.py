@@ -3,8 +3,8 @@
 """The counters of the board's deltas and poses. They show lost deltas and a restart of the board.
 
 The counter SEQ of the deltas has one byte and wraps every 10.24 s at 25 Hz. The arrival times show
-how often it has wrapped. Poses have a counter of their own. It can show lost deltas before the next
-delta arrives.
+how often it has wrapped. The poses have a counter of their own. From pose to pose, the board sends
+a fixed number of deltas, so a pose can show lost deltas before the next delta arrives.
 
 Input: counters and arrival times; this module does not know what a frame contains.
 """

@@ -16,8 +16,9 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after a log's last change of state. If /diagnostics shows this state even later, the
-driver was still running. Otherwise, the state "disconnected" means that the driver had ended."""
+"""Time in s from the begin of a log's last state. If /diagnostics still shows the state after this
+time, the driver was running. If not, a last state "disconnected" means that the driver had ended.
+"""
 
 
 def judge(log: Log) -> Iterator[Finding]:
