@@ -23,10 +23,10 @@ class Until(Enum):
         "Motion is refused until you send a zero command, or until no command arrives for"
         " `cmd_vel_timeout`"
     )
-    START = "This is the second such stop within 60 s, so motion is refused until you call ~/start"
+    START = "This is the second such stop within 60 s: motion is refused until ~/start is called"
     ESTOP = (
-        "This is the second such stop within 60 s, so motion is refused until you latch and release"
-        " the e-stop"
+        "This is the second such stop within 60 s: motion is refused until the e-stop is latched"
+        " and released"
     )
 
 
