@@ -80,7 +80,8 @@ class Adjusting(Moves):
     def _predict_turn(self) -> None:
         """Set the ratio of wheel speeds (left / right) from which the robot's turn is computed.
 
-        The ratio is None if the turn is computed from the reported headings.
+        The ratio is None except in a turn on the spot, and in a backward drive (B) in which the
+        server reports no headings.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:

@@ -156,7 +156,7 @@ class MartBoard(Board):
         """Return the readings that are due even if no datagram arrives.
 
         Examples are odometry, and the result of a job. While a busy server is expected to be
-        silent, NOTHING_MEASURED every ``EXPECTED_EVERY_S`` shows that the server is alive.
+        silent, NOTHING_MEASURED every ``EXPECTED_EVERY_S`` makes the driver regard it as alive.
         """
         readings = self._pilot.take()
         pilot = self._pilot
@@ -236,9 +236,9 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server has made no forward drive (RM) yet: its heading is exactly zero.
+        """Whether the server's heading is known and exactly zero, as before its first RM.
 
-        Otherwise, the driver must not set back the server's clock: RM integrates the turn rate over
-        the time since the previous RM.
+        Otherwise, the driver must not set back the server's clock: each forward drive (RM)
+        integrates the turn rate over the time since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero

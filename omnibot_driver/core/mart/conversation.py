@@ -45,8 +45,7 @@ SLOW_S, DISTURBED_S = 0.06, 5.0
 * ``DISTURBED_S``: duration of the disturbance after the last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
-"""Urgent queries. The driver sends an urgent query even while the reply to an earlier query is
-late.
+"""Urgent queries. The driver sends them even while the reply to an earlier query is late.
 
 The driver then marks the answer to the urgent query as doubtful, because it may be the late reply.
 """

@@ -41,7 +41,7 @@ class DrivenWheel:
         return self.units - before
 
     def error(self, less: int, seconds: float, per_unit_mps: float) -> float:
-        """Return the measured speed minus the expected one, in nominal units.
+        """Return measured minus expected speed, averaged over ``seconds``, in nominal units.
 
         ``less``: assumed minus real units of the motor, which differ after a lost command.
         ``per_unit_mps``: speed in m/s of an ideal motor with one unit.

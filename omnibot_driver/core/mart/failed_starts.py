@@ -16,8 +16,8 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
-"""After this number of starts in a row that do not turn the right-hand wheel, the driver gives up
-the motion. Each start may turn the left wheel, and so move the robot."""
+"""After this number of starts of B (backward), R or L (turns) in a row that do not turn the
+right-hand wheel, the driver gives up. Each start may turn the left wheel, and so move the robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
@@ -31,8 +31,8 @@ class FailedStarts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: whether the server has certainly received this start, so that a later copy is
-        unlikely.
+        ``arrived``: whether the server has certainly received this start command, and a late copy
+        of the command is unlikely.
         """
         word = self._start
         assert word is not None

@@ -43,7 +43,7 @@ class Done:
     * ``completed``: whether the server reported success, and no stop ended the move.
     * ``expected``: distance in m, or turn in rad, of a complete run, learned from earlier moves.
     * ``stopped_again``: whether the driver has sent a stop after the move, against a second run.
-    * ``slowness``: usual time for a move, relative to a robot with the default settings.
+    * ``slowness``: usual time per inch or degree, relative to a robot with the default settings.
     * ``gyro_scale``: true turn divided by the turn that the server's gyro measures.
     """
 

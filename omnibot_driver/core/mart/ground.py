@@ -74,8 +74,8 @@ ABSENT_BUSY_S: Final = 2.5
 A stop, for example, keeps the server busy.
 """
 RESTARTED_S: Final = 3.0
-"""Time without a reply, in s, after which the server may have been restarted. A restart frees a
-stop port that hangs."""
+"""Time without a reply, in s, after which a server whose stop port hangs may have been restarted.
+A restart frees the port."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
