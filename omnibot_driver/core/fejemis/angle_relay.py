@@ -22,7 +22,8 @@ LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit, in degrees, for the false angle to the left that results from a lost minus sign.
 
-Angles to the right have a minus sign, whose loss the checksum may not detect.
+Angles to the right have a minus sign. The checksum does not detect that ``-`` and ``6`` are both
+lost.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

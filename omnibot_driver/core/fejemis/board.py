@@ -234,7 +234,7 @@ class FejemisBoard(Board):
         """Latch or release the e-stop, according to a new order of the driver.
 
         ``estop``: whether the order is an emergency stop, which also switches off the brush and the
-        lift.
+        lift. Any other order releases the e-stop.
         """
         if not estop:
             self._obedience.release(self._now)

@@ -116,8 +116,8 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist that the sent ``packets`` give to the robot's body.
 
-        Call this method once after each ``encode``, with the returned packets. Without a preceding
-        ``encode``, or with other packets, the method returns a standstill.
+        Only the first call after ``encode``, with the returned packets, gives a motion. Any other
+        call returns a standstill.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

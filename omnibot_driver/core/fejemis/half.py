@@ -120,7 +120,7 @@ class Half:
         """Whether the board may have restarted and lost the user's settings.
 
         The value becomes True when the board stops sending the data that driving requires, and
-        False with the next heartbeat.
+        False with a heartbeat that was sent later.
         """
         return self._unsure_at is not None
 

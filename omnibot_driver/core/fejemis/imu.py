@@ -16,7 +16,7 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Limit, in sampling periods, for the time between the arrivals of two late samples.
+"""Limit, in sampling periods, for the time between the arrivals of two successive late samples.
 
 Above this limit, a sample was lost before them. Below this limit, they are late because the host
 has stalled.

@@ -285,7 +285,7 @@ def _answers(role: Role, message: Message) -> bool:
     """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
     The boards do not answer ``eer`` (load a configuration) itself. Some front boards do not know
-    the query ``fwoi``.
+    the query ``fwoi``: their "unhandled" counts as an answer.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

@@ -45,7 +45,7 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 def nearest(number: float, *, negative: bool) -> tuple[float, str]:
     """Return the safe number nearest to a positive ``number``, and the text of the safe number.
 
-    The checksum of a line with safe numbers detects the loss of any two characters.
+    The checksum of a line detects the loss of any two characters of its safe numbers.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
@@ -57,7 +57,7 @@ def nearest(number: float, *, negative: bool) -> tuple[float, str]:
 def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
     """Return the safe numbers just below and just above ``number``, each with its text.
 
-    The checksum of a line with safe numbers detects the loss of any two characters.
+    The checksum of a line detects the loss of any two characters of its safe numbers.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
@@ -68,7 +68,7 @@ def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
     """Return the safe numbers from ``least`` to ``most``, each with its text.
 
-    The checksum of a line with safe numbers detects the loss of any two characters.
+    The checksum of a line detects the loss of any two characters of its safe numbers.
     """
     numbers, texts = numerals(negative=negative)
     part = slice(bisect_left(numbers, least), bisect_right(numbers, most))

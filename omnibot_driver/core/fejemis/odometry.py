@@ -14,9 +14,9 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Factor by which the driver corrects the wheels' motion towards a new pose.
+"""Fraction of the difference between a new pose and the wheels' motion that the driver corrects.
 
-The factor applies if rounding of the pose can explain the difference from the wheels' motion.
+The fraction applies if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
@@ -47,7 +47,7 @@ Each of these poses must agree with the rejected pose just before it.
 MOVED_FRAME: Final = 2
 """Number of rejected poses in a row that prove a new coordinate frame if the wheel speeds agree.
 
-The motion from each rejected pose to the next must agree with the wheel speeds.
+The wheel speeds must agree with the motion to each of these poses from the rejected pose before.
 """
 AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012
@@ -95,7 +95,8 @@ class PoseOdometry:
         self._driven: Pose | None = None
         """Motion from the last accepted pose to the last rejected pose; None while it is unknown.
 
-        The wheel speeds show this motion, even if the board has begun a new coordinate frame.
+        The wheel speeds give the motion to the first rejected pose. The poses give the rest, unless
+        the origin moves again.
         """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
@@ -129,7 +130,7 @@ class PoseOdometry:
         """Return a list with the displacement from the previous pose; empty without a displacement.
 
         Every 0.2 s, and when the board begins a coordinate frame, a PoseReading follows: the
-        frame's first pose plus all returned displacements.
+        frame's first pose plus all displacements returned since.
         """
         displacement = self.pose(pose)
         if displacement is None:
