@@ -96,7 +96,7 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     """Return the values of all parameters of the board ``given["board"]``.
 
     Parameters that are not in ``given`` have their default values. Raises ParameterError for a
-    wrong value or an unknown parameter.
+    wrong value, or for a parameter that this board does not have.
     """
     table = table_for(given)
     for name in given:

@@ -66,8 +66,9 @@ class Transport(Protocol):
     def write(self, packets: Packets) -> None:
         """Write all packets.
 
-        A blocked line is regarded as missing, and gets only the bytes that it accepts at once.
-        Raises LinkError, and discards all unsent bytes, if the connection is lost.
+        A missing line, such as one of several that was blocked for 0.2 s, gets only the bytes that
+        it accepts at once. Raises LinkError, and discards all unsent bytes, if the connection is
+        lost.
         """
 
     def write_if_room(self, packets: Packets) -> int:

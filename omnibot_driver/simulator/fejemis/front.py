@@ -205,8 +205,8 @@ class FrontTeensy(Teensy[FrontConfig]):
     def _remote_control(self, rest: str) -> None:
         """Set the angle that the wheel must reach: ``atan2(F w, v)``, limited to ±90°.
 
-        ``v``, ``w``: commanded speed and turn rate. ``F``: distance from the axle to the front
-        wheel.
+        ``v``, ``w``: commanded speed and turn rate, both negated first if ``v`` < 0 and the
+        firmware is "mirrored". ``F``: distance from the axle to the front wheel.
         """
         _, v, turn_dps = wire.padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)

@@ -53,7 +53,7 @@ class DocumentedOdometry:
 class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each encoder tick, from the latest RPMs.
 
-    Each argument switches one fault of the firmware on:
+    Each of these arguments switches one fault of the firmware on:
 
     * ``stands``: the position does not change while both RPMs are equal.
     * ``divides``: the velocity is NaN or infinite if two ticks have the same time.
