@@ -84,7 +84,7 @@ class OutlierFilter:
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. If True, impossible but finite
-      displacements pass with ``measured`` set to False.
+      displacements pass with ``measured`` False, and ``possible`` too if they have a duration.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:

@@ -18,7 +18,8 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
-A robot that is clearly slower than every set-point within this time is assumed to be held.
+A robot is assumed to be held if, in a displacement, it is clearly slower than all set-points of the
+displacement and of this time before it.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01

@@ -157,8 +157,8 @@ class MotionMonitor:
     def count_impossible(self, now: float) -> Fault | None:
         """Return the fault that four impossible displacements in a row show, or None.
 
-        Call this method instead of ``check`` if the board corrects its own odometry; fewer than
-        four may be corrections.
+        Call this method instead of ``check`` for an impossible displacement of a board that
+        corrects its own odometry; fewer than four may be corrections.
         """
         self._error.reset()
         self._impossible += 1
@@ -223,10 +223,10 @@ class MotionMonitor:
         return fault
 
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
-        """Return the fault of a robot whose motion does not fit its commands.
+        """Return the fault of motion that does not fit the commands.
 
-        Such a linear motion is too fast within 60° of a set-point's direction, or with an unknown
-        heading; otherwise, it goes the wrong way.
+        Linear motion is too fast within 60° of a set-point's direction or with unknown heading; a
+        turn, in a set-point's direction. Otherwise, the direction is wrong.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

@@ -99,10 +99,10 @@ class Odometry:
         )
 
     def reset(self, now: float = math.inf) -> list[OdometryEstimate]:
-        """Move the origin of the odometry frame to the robot's current pose.
+        """Move the odometry frame's origin to the robot's current pose.
 
-        Return the estimates of displacements that waited for a pose. If most of a gap was before
-        ``now`` (s, by the stamps' clock), its motion is discarded.
+        Return the estimates of displacements that waited for a pose. If a gap was mostly before
+        ``now`` (s, by the stamps' clock; by default entirely), its motion is discarded.
         """
         self.alignments += 1
         due = []

@@ -82,7 +82,7 @@ class PoseGate:
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
         """Return whether the pose ``told`` confirms ``doubted``, the last unexpected pose.
 
-        Afterwards, ``doubted`` is None. A pose that is not confirmed counts as rejected. ``gap``:
+        Afterwards, ``doubted`` is None; if it was not confirmed, it counts as rejected. ``gap``:
         covariance of the motion lost since the last accepted pose.
         """
         doubted, self.doubted = self.doubted, None

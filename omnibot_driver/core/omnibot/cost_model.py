@@ -273,8 +273,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    For an IMU frame, the byte must also be FF, or the last word must differ from that of the
-    previous IMU frame.
+    The byte must occur in headers. In an IMU frame, it must also be FF, or the last word must
+    differ from that of the previous IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -99,8 +99,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
-    If so, the unusual content comes from a shock, not from damage. ``closed``: the result if
-    ``held``, the received bytes, ends at ``at``.
+    If so, a shock caused the content, not damage. ``closed``: whether no more bytes come; the
+    result if ``held`` ends at ``at``.
     """
     if at == len(held):
         return closed

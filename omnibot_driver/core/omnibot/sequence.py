@@ -21,8 +21,8 @@ WRAP: Final = 256
 LATE_S: Final = 0.5
 """Limit, in s, for the difference between measured and counted time from delta to delta.
 
-Beyond the limit, the board may have restarted. Keep the limit above 0.24 s, the largest error of an
-arrival time.
+Beyond it plus the drift (``DRIFT``), the board may have restarted. Keep it above 0.24 s, the
+largest error of an arrival time.
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and of times that are computed from its counters.
@@ -89,7 +89,7 @@ class Sequence:
     def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.
 
-        Only the next delta can show which.
+        The next delta decides which is assumed; only the board's pose can prove a restart.
         """
         self._paused, self._pose = True, None
 

@@ -100,10 +100,10 @@ class DeviceClock:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the sampling time in s of each reading. A displacement has the stamp of its tick.
+        """Return the sampling time in s of each reading; for a displacement, that of its tick.
 
-        Stamps increase from tick to tick, and are not later than the read at ``now``. ``edge``: end
-        of this read; None if unknown.
+        Stamps increase from tick to tick, exceeding the read time ``now`` by microseconds at most.
+        ``edge``: the read's end; None if unknown.
         """
         if self._stamped_tick is None and now - self._seen_at > self._longest_loss_s:
             self.restart()  # only a part of a sample has arrived, long ago
@@ -190,8 +190,8 @@ class DeviceClock:
     def _missing(self, reading: DisplacementReading) -> int:
         """Return how many ticks to add to the tick number, as a displacement's counter shows.
 
-        The result is negative if the tick number is too high, and 0 if the displacement is the
-        first one or has no duration.
+        The result is negative if the tick number is too high, and 0 if no earlier displacement is
+        known, or this one has no duration.
         """
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
