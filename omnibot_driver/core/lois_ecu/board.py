@@ -285,7 +285,7 @@ class LoisEcuBoard(Board):
         """Request a record of ``samples`` samples, for example of times between ticks.
 
         A later reading contains the record, or the reason why there is none. Raises RequestRefused,
-        for example for too many samples.
+        for example for too many samples, or in a terminal mode.
         """
         self._ecu.record(kind, samples)
 

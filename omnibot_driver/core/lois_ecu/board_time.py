@@ -90,8 +90,8 @@ class BoardTime:
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
         """Return the delay of a tick report in s by the fitted clock, and whether it is irregular.
 
-        A late read does not explain an irregular delay. With too few stored reports, the result is
-        0 and False.
+        A late read does not explain an irregular delay. Without a known unit, or with too few
+        stored reports, return 0 and False. This report is not stored.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

@@ -123,10 +123,10 @@ class Comparison:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
     def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
-        """Return the difference between a wheel's reported and expected count, in ticks.
+        """Return a wheel's reported count minus the expected one; 0 while ticks are not counted.
 
-        Also return whether the difference is too large for an error of the motion filter.
-        ``late_s``: how much later than usual the report arrived.
+        Also return whether the difference (in ticks) is too large for an error of the motion
+        filter. ``late_s``: how much later than usual the report arrived.
         """
         motion = self._motion
         wheel, speed = motion.wheels[index], motion.speed_mps(index)

@@ -64,7 +64,8 @@ class LateReads:
         told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]
         known = [self._last.ticks] if self._last else []
         known += [ticks for _, ticks in told]
-        # If a clock in ns may have wrapped or restarted, the arrival times are used.
+        # If the board may have restarted, a clock in ns does not show the time that has passed. The
+        # arrival times are then used.
         shown = self._unit == "ms" or not any(map(self._may_have_restarted, known, known[1:]))
         found, before = list(arrived), self._last
         leading_s = before.at_s if before and self._waited and not told else math.inf

@@ -79,8 +79,8 @@ class MotionFilter:
         self.differing_mps = math.inf
         """Smallest estimated difference (m/s) of measured wheel speeds since the last comparison.
 
-        At equal speeds, the public firmware does not update its position, so the board's distance
-        may be too short.
+        The board's distance, which is compared with the estimate, may be too short, because the
+        public firmware does not update its position at equal speeds.
         """
         self.speed_errors = SpeedErrors(self)
         self.history = FilterHistory(self.filter)

@@ -66,7 +66,7 @@ longer than a boot (2 s)."""
 UNANSWERED_S: Final = 5.0
 """Time in s without the requested GPS date after which the driver restores the normal mode.
 
-Such a board may ignore requests and send no tick reports.
+The board may send other reports, but too few tick reports to start further settings rounds.
 """
 RESYNC: Final = b"::"
 """Two extra colons between a line with a checksum and a line without.
@@ -182,7 +182,7 @@ class SettingsWriter:
         """Write all settings again, as soon as no motion is commanded.
 
         Call this method if a wheel does not start. The board may lack the low-pass coefficient, or
-        expect checksums.
+        expect checksums although the driver sends none.
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now

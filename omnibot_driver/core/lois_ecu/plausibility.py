@@ -100,7 +100,7 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what a subclass has inferred from earlier reports. They no longer count."""
+        """Forget what a subclass has inferred from reports before a restart or a reset."""
 
 
 class TicksGate(Gate[Ticks]):

@@ -230,8 +230,8 @@ class ReportedSpeed:
     def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
         """Correct the wheel's estimated motion by a reported speed.
 
-        ``speed_mps``: the reported speed, which is the wheel's mean speed between its last two
-        ticks, in m/s, with sign. ``duration_s``: time since the last report, in s.
+        ``speed_mps``: the reported speed, corrected for its rounding: the wheel's mean speed
+        between its last two ticks, with sign. ``duration_s``: time since the last report, in s.
         """
         motion, estimate, base = self._motion, self._motion.filter, self._wheel.base
         push = estimate.mean[base + PUSH]

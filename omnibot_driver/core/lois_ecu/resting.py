@@ -40,8 +40,8 @@ GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Probabilities that a wheel is at rest, by the number of repetitions of its reported speed.
 
-The last value is also for all further repetitions. The values of ``FASTER`` are assumed; the others
-were counted on the public firmware.
+The last value also holds for more repetitions. ``tell`` selects one tuple. ``FASTER`` is assumed;
+the others were counted on the public firmware.
 """
 
 

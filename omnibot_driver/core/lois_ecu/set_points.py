@@ -78,7 +78,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Plan RPM 0/0 before the next motion, so that the firmware forgets its measured speed."""
+        """Plan RPM 0/0 before the next set-points: the firmware then forgets its measured speed."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

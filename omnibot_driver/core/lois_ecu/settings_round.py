@@ -23,8 +23,8 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 ROUNDS: Final = 5
 FAST_TICKS_MS: Final = 200
-"""Longest period of the tick reports, in ms, that each settings round writes. Fewer rounds write a
-longer period, because each write restarts the period on the board."""
+"""Longest period of the tick reports, in ms, that each of the first ``ROUNDS`` settings rounds
+writes. Fewer rounds write a longer period, because each write restarts the period on the board."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the setting LEFT_SHORT_CORRECTION in the public firmware after a boot."""
 

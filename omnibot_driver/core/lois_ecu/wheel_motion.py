@@ -153,8 +153,8 @@ class Wheel:
     def counts(self, speed_mps: float, *, signed: bool) -> float:
         """Return the factor by which motion of the wheel changes the tick count: 1, -1 or 0.
 
-        ``signed``: whether the count decreases when the wheel rolls backward. The factor is then
-        always 1.
+        0: the board does not count. ``signed``: whether the count decreases when the wheel rolls
+        backward. The factor is then 1.
         """
         if signed:
             return 1.0
