@@ -32,7 +32,8 @@ def obeying(
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: returns True if the age of a message does not matter.
     * ``is_stop``: returns True for a command to stop, which is passed on at any age.
-    * ``ends_goal``: returns True if a refused message must still end the drive to a goal.
+    * ``ends_goal``: returns True if a refused message must still end the drive to a goal; may raise
+      CommandRefused.
     """
     transit = Transit()
 

@@ -193,7 +193,8 @@ def _run(ending: Ending, args: list[str]) -> None:
         except BaseException as error:  # SystemExit too: without the executor no callback would run
             driver.report_defect(error)
 
-    # The main thread must only wait, so that a second signal does not interrupt the shutdown.
+    # The executor runs in its own thread, so that the driver reacts to a signal even if a callback
+    # takes long, and a second signal cannot interrupt the shutdown.
     spinner = threading.Thread(target=spin, name="omnibot-executor", daemon=True)
     spinner.start()
     ending.wait()

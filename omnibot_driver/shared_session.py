@@ -58,8 +58,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the link wrote its last Stop to every line. Always False if the
-        port was reopened for this Stop, and no stop was owed (``Shutdown.owed``)."""
+        """Whether the link wrote its last Stop to every line. Always False if the port was reopened
+        for this Stop, and no stop was owed (``Shutdown.owed``)."""
         self.stood = False
         """Whether the robot was known to stand still when the link ended. Stop was written to every
         line, and measurements showed the robot at rest after the last motion command."""
@@ -101,7 +101,8 @@ class SharedSession:
           refusal.
 
         Raises CommandRefused if ``action`` does, or if the command may have been sent before or
-        during a recent stall of this process. The constructor's ``refused`` receives the reason.
+        during a recent stall. The constructor's ``refused`` receives the reason, unless the queue
+        of events is full.
         """
         try:
             with self.lock:

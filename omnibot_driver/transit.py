@@ -37,7 +37,7 @@ a larger error.
 CLOCK_RETREATS: Final = 10.0
 """Weight of an early arrival in the choice of a message's sender. A late arrival has weight 1."""
 ALIKE_S: Final = 0.02
-"""Largest difference, in s, at which a message's time fits two senders equally well.
+"""Largest difference, in s, between the misfits of two senders that fit a message equally well.
 
 The driver then chooses the sender whose last message had the highest sequence number.
 """

@@ -234,7 +234,7 @@ class ModeManager:
         """Record that the board sends data and runs.
 
         ``estopped``: whether the driver's e-stop is latched. If it is latched, the answer to a
-        start request tells this to the user.
+        start or reset that ends in a running board tells this to the user.
         """
         data_at, self._data_at = self._data_at, now
         if self.at_rest:

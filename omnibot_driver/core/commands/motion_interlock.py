@@ -72,7 +72,7 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Restart the time without commands after which a refusal ends: ``timeout_s``, in s.
+        """Restart the time without commands after which a refusal can end: ``timeout_s`` (s).
 
         Call this method after a refused command, and after a stall of ``stalled_s`` (s).
         """

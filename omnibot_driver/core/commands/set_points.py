@@ -68,7 +68,8 @@ class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
     * ``is_zero`` (argument): returns whether an order is a standstill; may raise CommandRefused.
-    * ``before``: previous set-point, at whose velocity the ramp starts.
+    * ``before``: previous set-point. A ramp starts at its velocity, or at rest if it is not a body
+      velocity.
     * ``since``: earliest start of a ramp, in s.
     """
 

@@ -29,7 +29,7 @@ AT_LEAST: Final = 2
 A single displacement could be damaged, or come from the time before the wheels began to turn.
 """
 PROOFS: Final = 2.0
-"""Factor for the time after which the driver stops waiting for a proof of a stop.
+"""Factor for the shortest time after which the driver stops waiting for a proof of a stop.
 
 The factor multiplies the duration of the standstill that proves a stop. If displacements are rare,
 the driver waits longer.

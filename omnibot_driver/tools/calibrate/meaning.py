@@ -25,7 +25,7 @@ this limit, the robot is regarded as stopping."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 """Limits for the speed of a drive with twice the command, divided by the speed of the first drive.
 
-The speed is regarded as doubled within ``DOUBLED``, and as unchanged up to ``UNCHANGED``.
+The speed is regarded as doubled within ``DOUBLED``, and as unchanged below ``UNCHANGED``.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.

@@ -18,7 +18,7 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the residuals' autocorrelation, for lags up to ``lags``.
 
     ``rows``: rows of successive residuals. With a single lag, its value is limited to the range
-    from -0.5 to 0. With several lags, the values are tapered.
+    from -0.5 to 0. With several lags, the values are reduced, more at larger lags.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))

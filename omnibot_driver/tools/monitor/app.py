@@ -151,7 +151,7 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP."""
         # Textual's ``suspend`` ends the thread that reads keys. After the empty block, Textual
-        # draws the screen, and starts a new such thread. Without ``suspend``, two threads would
+        # draws the screen, and starts a new such thread. If the old thread still ran, both would
         # read keys.
         with self.suspend():
             pass

@@ -84,8 +84,8 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    ``usable``: for each measurement, whether to use it. If commands were constant for at least
-    ``SUSTAINED_S`` (s) in all, gains come from these times only.
+    ``usable``: for each measurement, whether to use it. If an axis's command was constant for at
+    least ``SUSTAINED_S`` (s) in all, the gain of this axis comes from these times only.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
