@@ -46,7 +46,8 @@ class LateReplies:
     def came(self, reply: Ok, now: float) -> None:
         """Record a late ``reply`` to an earlier request, and stop expecting one of the same form.
 
-        Nothing changes if an equal reply came within the last ``delay_s``: ``reply`` may be a copy.
+        Nothing changes if an equal reply has answered a request in the last ``delay_s``: ``reply``
+        may be a copy.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)

@@ -128,8 +128,8 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn, the driver first downloads the server's record if possible. Otherwise, the
-        driver learns at once from the wheel.
+        After a turn, the driver first downloads the server's record if it is needed and possible.
+        Otherwise, the driver learns at once from the wheel.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -235,8 +235,8 @@ class Moves(Asking):
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
         """Return whether the driver may have stopped a second run of a controlled move.
 
-        The result is False if no stop was sent, or if a complete move left no time for a second
-        run.
+        False if no stop was sent after the move, or if the move was complete and the server
+        answered too soon for a second run.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

@@ -101,8 +101,8 @@ class Pilot(Hearing):
     def busy(self, now: float) -> bool:
         """Return whether the driver expects the server to be silent, because the server is busy.
 
-        The result is False if the server may be lost: it was silent for too long (``_absent_s``)
-        before a stop.
+        The result is False if the server may be lost: outside controlled moves, it was silent for
+        too long (``_absent_s``) before a stop.
         """
         if (stopping := self._stopping) is not None:
             silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s
@@ -226,9 +226,10 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        An encoder count after the move, or the answer to a HELLO sent after its start, excludes a
-        duplicate: the server executes a duplicate before it answers.
+        An encoder count after the move excludes this. So does the answer to a later HELLO, at least
+        twice the network delay after the move's start.
         """
+        # the server would execute a duplicate before it answers
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free
 

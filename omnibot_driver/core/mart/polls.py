@@ -26,7 +26,7 @@ STILL: Final[Mapping[Word, float]] = {
 DRIVING: Final[Mapping[Word, float]] = {RMRA: MOTION_S, ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
 TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, RMRA: 0.15, MCSTAT: 0.5}
 """Periods in s of the queries in a turn on the spot. The voltage query VOLTS is left out: it would
-crash a server that has just restarted, and a turn does not show a restart."""
+crash a server that has just restarted, and the replies in a turn may not show a restart."""
 PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.STILL: STILL,
     State.DRIVING: DRIVING,

@@ -139,7 +139,7 @@ class Reckoning(CorrectedPose):
         self.stands, self._stood_s = True, now
 
     def rest(self, longest: float = math.inf) -> float:
-        """End the motion, and return the correction of the heading in rad.
+        """End the motion; correct the heading, and return the correction in rad (``_end_turn``).
 
         Call this after the last encoder count, which includes the coasting. ``longest``: longest
         possible straight move in m, or largest turn in rad.

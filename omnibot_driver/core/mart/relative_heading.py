@@ -40,7 +40,8 @@ class RelativeHeading:
     """The relative heading within a motion.
 
     * ``told_s``: time of the last accepted heading.
-    * ``from_s``: earliest time at which the server can have measured the last certain heading.
+    * ``from_s``: earliest time at which the server can have measured the last certain heading. A
+      changed heading in a doubtful reply (``Moment.doubtful``) is not certain.
     * ``changed_s``: time of the last change of heading.
     * ``same``: number of equal headings since the last change.
     """
@@ -102,7 +103,7 @@ class RelativeHeading:
     def tell(self, angle_rad: float, when: Moment, stood_s: float, scale: float = 1.0) -> bool:
         """Process a reported heading; return whether it is plausible and has changed.
 
-        ``stood_s``: time at which the last motion ended; infinity during a motion. ``scale``: true
+        ``stood_s``: time at which the robot was stopped; infinite while driven. ``scale``: true
         turn to the left divided by the change of the reported heading.
         """
         if not abs(angle_rad) < MOST_RAD:

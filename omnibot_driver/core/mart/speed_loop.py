@@ -121,8 +121,8 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that neither motor turns, because the present motor units are too few.
 
-        ``units``: the units of both motors; None for those last commanded. A motor with MOST_DEAD
-        units or more is regarded as blocked.
+        ``units``: the units of both motors; None for those last commanded. Nothing is learned from
+        a blocked motor, which has MOST_DEAD units or more.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -185,8 +185,8 @@ class SpeedLoop(Motors):
     ) -> None:
         """Use a displacement, measured over ``seconds``, to learn how fast the motors turn.
 
-        ``right_only``: whether only the right wheel was measured. If so, the left motor is assumed
-        to have changed like the right motor.
+        This also updates the heading error. ``right_only``: whether only the right wheel was
+        measured, so that the left motor is assumed to change like the right one.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

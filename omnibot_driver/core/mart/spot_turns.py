@@ -53,9 +53,11 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 * ``TOLD_RAD``: angle in rad above which the server's angle is used instead of the wheel's.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Terms of the largest plausible error of the angle in the reply to a stop command: UNSURE_RAD
-(rad), and UNSURE_PART times the expected turn. A larger error means that the number may be an
-encoder count."""
+"""Terms of the largest plausible error of the angle in a stop's reply.
+
+It is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two queries.
+Above it, the number may be an encoder count.
+"""
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.
 """
@@ -190,8 +192,8 @@ class SpotTurns:
     def _is_held(self, seen_radps: float) -> bool:
         """Return whether the robot turns so slowly that something must be holding it.
 
-        The driver must not learn from this turn. ``seen_radps``: measured rate of the turn. The
-        result is False before the first learned turn.
+        If so, the driver must not learn from the turn. ``seen_radps``: measured rate of the turn.
+        The result is False before the first learned turn.
         """
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
@@ -205,7 +207,8 @@ class SpotTurns:
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
-        ``unseen_s``: time in s from the last encoder count to the first stop command.
+        ``unseen_s``: time in s from the last encoder count to the first stop command. ``trip_s``:
+        average duration of a query.
         """
         if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:
             return False

@@ -143,7 +143,7 @@ STARTS: Final[Mapping[Word, Motion]] = {
 }
 """The motion that each start command begins."""
 
-# before the failure of MCR or MCL, some servers turn the robot for 0.5 s
+# with a dead IMU, some servers turn the robot for 0.5 s before they answer MCR or MCL
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 

@@ -73,7 +73,7 @@ class Stopping:
     * ``owed``: number of earlier requests whose late replies would look like replies to a stop.
     * ``move``: the controlled move to stop, whose reply ends the stop; None for another motion.
     * ``planned``: whether the motion is stopped without a fault.
-    * ``rounds``: number of times that the driver has sent the stop to the command port.
+    * ``rounds``: number of times that the driver has sent the usual stop commands (``HALTS``).
     * ``strange``: the failure to report to the user if the stop does not succeed; may be empty.
     """
 

@@ -104,10 +104,10 @@ class SwitchOff:
         self._misses += 1
         if self._misses < (MOST_MISSES_DISTURBED if disturbed else MOST_MISSES):
             return False
-        self.needed = self.underway = False
-        self._misses = 0
         # if an unanswered MCS is executed later, the server refuses the next motion, and MSM
         # follows
+        self.needed = self.underway = False
+        self._misses = 0
         gives_up = word is MCS and self._supported
         self._supported = self._supported and not gives_up
         return gives_up

@@ -20,7 +20,7 @@ class TurnAngle:
     """The angle of the current turn on the spot, or of the last one.
 
     ``spun_rad``: the turn that the wheel has measured, or the recorded angle that ``record`` has
-    accepted. The corrections that methods return are in rad.
+    accepted. The caller adds returned corrections (rad) to the heading.
     """
 
     def __init__(self) -> None:

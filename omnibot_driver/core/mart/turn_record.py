@@ -19,8 +19,8 @@ another turn."""
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
 """Limits, in rad, for the sum of the turns that were read from records.
 
-From LEAST_RAD on, the driver uses the ratio of the motors' speeds. From ENOUGH_RAD on, it downloads
-no more records.
+From LEAST_RAD on, the driver uses the ratio of the motors' speeds that the records show. From
+ENOUGH_RAD on, it downloads no more records.
 """
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
