@@ -70,7 +70,7 @@ class RepeatedReset:
 
     def give_up(self) -> None:
         """End the reset of the board: do not repeat it, and do not return a ResetReading for it."""
-        self._proof, self.again_at_s = None, math.inf
+        self._proof, self.left, self.again_at_s = None, 0, math.inf
 
     def readings(self) -> list[Reading]:
         """Return a ResetReading if new tick counts show that the board was reset; otherwise none.

@@ -10,14 +10,18 @@ from any_board import TICK_S
 from lois_bench import FIRMWARE, SETTINGS, Bench, configure, told
 from lois_drives import HOST_GAINS
 
+from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, Setting, Stream, encode_command
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.outbound import STOP
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
+from omnibot_driver.core.packets import joined, packed
 from omnibot_driver.core.requests import Request
 
+RESET = b":180000000033\n"
 OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFFFF)
 
 
@@ -106,6 +110,20 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
     assert [wheel.ticks for wheel in bench.board.wheels] == [0, 0]
 
 
+def test_a_reset_that_was_given_up_before_it_was_sent_is_never_sent() -> None:
+    """The driver gives up a reset before the reset reaches the line, and then writes Stop.
+
+    The board receives no reset afterwards.
+    """
+    board = LoisEcuBoard(LoisEcuSettings())
+    stream = board.actuator(StopProof())
+    assert RESET in joined(board.reset())
+    board.reset_given_up()
+    stream.wrote(packed(encode_command(STOP)), 1.0)
+    for tenths in range(11, 40):
+        assert RESET not in joined(board.due(tenths / 10))
+
+
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
     """If the tick counters are already zero, the driver answers a reset as unconfirmed.
@@ -119,7 +137,7 @@ def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
     assert "unconfirmed" in done.message
     assert "0 and 0 ticks" in done.message
     sent = b"".join(data for _, data in bench.written[before:])
-    assert sent.count(b":180000000033\n") >= 2
+    assert sent.count(RESET) >= 2
 
 
 @FIRMWARE
