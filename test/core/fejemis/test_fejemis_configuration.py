@@ -237,7 +237,7 @@ def test_a_small_difference_is_written_after_a_start() -> None:
 
 @pytest.mark.slow
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
-    """The driver sends a query without a checksum, and the query loses one or two characters.
+    """A query or subscription without a checksum loses one or two characters.
 
     The remaining characters never form a command that changes a setting of the board.
     """

@@ -319,8 +319,8 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
     """The firmware changes the number of decimals in a kind of line.
 
-    The decoder discards two changed lines, and accepts the next. If the number varies all the time,
-    all lines are accepted.
+    The decoder discards two changed lines, and accepts the next. If the number keeps varying, the
+    decoder soon accepts all lines.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
@@ -334,7 +334,7 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
     """Of 24 lines of one kind, only the first seven with an unusual form are rejected.
 
-    The unusual lines do not come three in a row.
+    The lines have checksums, and the unusual ones do not come three in a row.
 
     ``windows``: number of earlier windows of 24 lines without an unusual form.
     """

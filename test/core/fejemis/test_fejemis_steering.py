@@ -164,7 +164,8 @@ COMMANDS = [
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
     """After 2.5 s, the robot has the commanded speed, within 1.2 %, and turn rate, within 3 %.
 
-    The percentages are relative to the speed of the outer wheel.
+    The 1.2 % are relative to the outer wheel's speed, and the 3 % to this speed divided by the
+    track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)

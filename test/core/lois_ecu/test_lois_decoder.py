@@ -296,8 +296,8 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
 def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None:
     """A line that lost two characters looks like a line without a checksum.
 
-    The decoder drops this line. Real lines without a checksum are accepted after a few of them have
-    come.
+    The decoder drops this line. It also drops the first eight real lines without a checksum, and
+    accepts the next.
     """
     decoder = LoisDecoder(sum_required=False)
     heading, short = encode_report(Heading(0)), b":100000003b\n"

@@ -70,8 +70,8 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
     """A busy computer sends many settings without a pause, and all reach the board.
 
-    The driver requests a GPS date only after the last setting, because the board receives nothing
-    while it sends a date.
+    Each of the driver's rounds requests a GPS date only after its last setting, because the board
+    receives nothing while it sends a date.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)

@@ -49,8 +49,8 @@ def longest_gap_s(bench: Bench, ours: LoisEcuSettings) -> float:
 def test_ticks_keep_coming_while_many_settings_are_written(firmware: str, ticks_ms: int) -> None:
     """A setting changes in a drive, and the driver writes all settings.
 
-    The tick reports finally confirm the settings. Until then, none is so late that the driver
-    regards the board as lost.
+    The settings are finally confirmed while the robot still drives. No tick report is so late that
+    the driver regards the board as lost.
     """
     ours = replace(ALL, periods_ms={Stream.TICKS: ticks_ms, **SLOW})
     bench = Bench(firmware, ours)

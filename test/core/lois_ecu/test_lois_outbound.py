@@ -144,7 +144,7 @@ def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> No
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """If a motion line and a later LED line lose characters, the rest can be a wrong motion.
+    """If a motion line and a later LED line lose a whole line's length, a wrong motion can remain.
 
     The reverse order is safe, so only an LED line after a motion line must wait (15 ms).
     """

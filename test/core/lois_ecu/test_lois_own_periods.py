@@ -45,10 +45,10 @@ def error(bench: Bench) -> tuple[float, float]:
 
 @FIRMWARE
 def test_nothing_is_written_except_stop_the_low_pass_and_requests_for_a_date(firmware: str) -> None:
-    """With default settings, the driver writes only stops, the low-pass gain and GPS date requests.
+    """By default, the driver writes only stops, the low-pass coefficient and GPS date requests.
 
     The board keeps its own periods. After a restart of the board, the driver writes the low-pass
-    gain again.
+    coefficient again.
     """
     bench = Bench(firmware, own_periods=True)
     bench.run(8.0)

@@ -21,7 +21,8 @@ def read(path: Path, record: Record, count_s: float | None = 1e-4) -> str:
 def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
     """The CSV file of an RPM record has times between ticks, and speeds.
 
-    If a time does not fit into 16 bits (65535), the cells of the time and of its speed are empty.
+    The board reports 65535 for a time that does not fit into 16 bits. The cells of this time and of
+    its speed are then empty.
     """
     assert read(tmp_path / "new" / "rpm.csv", RPM).splitlines() == [
         "sample,left_tick_s,right_tick_s,left_rpm,right_rpm,left_counts,right_counts",

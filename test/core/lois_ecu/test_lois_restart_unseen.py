@@ -163,8 +163,8 @@ FAST_TICKS = 30
 def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
     """Return a ``Translation`` that has received the reports of two fast wheels.
 
-    In the first 20 reports, each count grows by ``FAST_TICKS``. ``steps``: growth of the left and
-    the right count in each later report.
+    In each of the first 20 reports, both counts grow by ``FAST_TICKS``. ``steps``: growth of the
+    left and the right count in each later report.
     """
     settings = LoisEcuSettings(wheel_radius_m=0.03, drive_mode="duty", duty_scale=100.0)
     translation, counts, now = Translation(settings), [0, 0], 0.0

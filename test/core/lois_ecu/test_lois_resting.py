@@ -120,9 +120,9 @@ def test_a_fall_in_gaps_between_reports_is_seen() -> None:
 
 
 def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
-    """If most reports are lost, a wheel whose reported speed falls by 6 RPM is probably at rest.
+    """Most reports are lost. A wheel's reported speed falls by 6 RPM, and is then repeated once.
 
-    This small fall may be the end of a larger one that began in a gap.
+    The wheel is probably at rest: this small fall may end a larger one that began in a gap.
     """
     assert told(17, 17, 16, 12, 12, every_s=GAP_S).chance < 0.2
     assert told(19, 18, 18, 12, 12, every_s=GAP_S).chance > 0.5
