@@ -2,8 +2,8 @@
 
 """Models of how a USB adapter delivers the bytes of a line.
 
-An adapter delivers all bytes of a board's tick at once, or pieces of up to 16 bytes, or packets
-that a timer ends. The delivery does not depend on the frames. All times are in s.
+An adapter delivers all bytes of a board's tick at once, or pieces of up to 16 bytes, or packets of
+62 bytes that a timer can end early. The delivery does not depend on the frames. All times are in s.
 """
 
 from collections.abc import Callable, Iterator

@@ -71,7 +71,7 @@ def alternate(
     times: int,
     goal: float | None = None,
 ) -> Figure:
-    """Measure the driver and the smallest program (``floor``) in turn; return ``times`` pairs."""
+    """Measure driver (``ours``) and ``floor`` in turn, ``times`` times each; return the results."""
     pairs = [(ours(), floor()) for _ in range(times)]
     return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
 

@@ -43,8 +43,8 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
 }
 """Largest allowed ratios of the driver to the floor, the smallest program with the same output.
 
-None: no limit. Order: median and 99th percentile of the latency, processor time, latency of
-cmd_vel.
+Key: the adapter. None: no limit. Order: median and 99th percentile of the latency, processor time,
+latency of cmd_vel.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 

@@ -40,7 +40,7 @@ The search begins after the last frame that was found. A message without an equa
 class PiecesTerminal(Terminal):
     """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
-    Bytes that arrive during a delay are delivered together.
+    Bytes that arrive during a delay of its thread are delivered together.
 
     ``silent_s``: longest time between two deliveries so far, in s.
     """

@@ -56,7 +56,7 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Always empty, so that the rig does not check the last bytes that the board received.
+        """Always empty, so that the last bytes that the board received are not checked.
 
         The driver of a MART still sends queries after its last stop.
         """

@@ -48,7 +48,7 @@ def never_sent(
 def lossy(number: int) -> BoardSettings:
     """Return settings of a simulated board for a line that loses bytes.
 
-    ``number``: selects how the board finds frames, and whether the board obeys an emergency stop.
+    ``number``: selects how the board finds commands, and whether it obeys an emergency stop.
     """
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)

@@ -20,7 +20,8 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
     After the delivery, the robot must be at rest.
 
-    ``seconds``: duration of the commands, which end 1 s before the delivery.
+    ``seconds``: time for which commands continue while the adapter holds bytes. The delivery is 1 s
+    later.
 
     ``mute``: whether the driver gets no data from the board until the delivery.
     """

@@ -29,7 +29,7 @@ class Bound:
     ``one_wrong_in_hidden``: the same number for chunkings that hide the idle gaps.
 
     ``delivered``: least share of the intact frames that must be decoded. With 1.0, only the first
-    two frames of a stream may be missing.
+    two of them in a stream may be missing.
 
     ``chunkers``: names of the chunkings that have these limits.
     """

@@ -69,9 +69,9 @@ def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
 
 
 def trials(fault: str, scene: str) -> int:
-    """Return how often each script of ``scene`` runs with this fault and each kind of receiver.
+    """Return how often each script of ``scene`` runs with this fault, for each receiver and name.
 
-    A script is one sequence of commands.
+    A script is one sequence of commands. ``boards`` yields the names.
     """
     if fault in OTHERS:
         return OTHER_TRIALS

@@ -2,9 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-This simplified board reports motion while the last set-point that arrived is a motion. It also
-reports motion while the driver sends motion commands, even if they do not arrive. A change of state
-appears in the reports after one or two ticks.
+A running board reports motion while the last set-point that arrived is a motion. It also reports
+motion while the driver sends motion commands, even if they do not arrive. A change of state appears
+in the reports after one or two ticks.
 """
 
 import math

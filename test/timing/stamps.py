@@ -99,8 +99,8 @@ def publish(name: str, lines: list[str]) -> None:
 def lines_and_events(seconds: float, seeds: int) -> None:
     """Measure the stamps on each kind of line, without an event and with each kind of event.
 
-    Events are a restart of the board and stalls of the host. The results are written into
-    docs/internals/time.md.
+    Events, which ``BLOCKS`` omits, are a restart of the board and stalls of the host. The results
+    are written into docs/internals/time.md.
     """
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]

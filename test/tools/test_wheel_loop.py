@@ -156,7 +156,7 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """The proposed gains keep the limits of Ms (maximum sensitivity) and overshoot.
 
     The error after a load change is smaller than with the manual's gains. The error after a command
-    may be larger, but by a smaller percentage.
+    may increase, but by fewer per cent than the other error decreases.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)

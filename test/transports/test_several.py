@@ -262,8 +262,8 @@ def test_of_two_drivers_that_wait_for_the_same_lines_one_gets_both(
 ) -> None:
     """Two drivers wait for the same two lines, and each driver has opened one of the lines.
 
-    Both go to the driver with the *leading* line, which has the first device path in alphabetical
-    order.
+    Both lines go to the driver with the *leading* line, whose device path is the first in
+    alphabetical order.
     """
     leading, other = sorted(ends.paths, key=os.path.realpath)
     late = tmp_path / "late"

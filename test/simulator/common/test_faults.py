@@ -67,7 +67,7 @@ def test_a_flip_changes_one_bit_and_no_length() -> None:
 
 @pytest.mark.parametrize("rate", ["-0.1", "1.1", "nan", "often"])
 def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
-    """The program rejects a rate outside 0 to 1, and the message says the range."""
+    """The program rejects a rate that is not a number from 0 to 1. The message says the range."""
     for name, toy in (("lose", toy_lines), ("flip", toy_lines), ("duplicate", toy_udp)):
         with pytest.raises(options.OptionError, match="give a number from 0 to 1"):
             options.from_words([f"--{name}={rate}"], toy)

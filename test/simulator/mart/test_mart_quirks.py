@@ -95,7 +95,7 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """Return whether a forward drive (RM) fails after a stop (SRM) that took 0.57 s.
+    """Return whether a forward drive (RM) fails if it directly follows a stop (SRM) of 0.57 s.
 
     If so, the RM has continued the sample count of the stop. A second RM must succeed.
     """

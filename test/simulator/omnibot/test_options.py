@@ -51,7 +51,7 @@ def test_every_option_reaches_the_board_and_its_line() -> None:
 
 @pytest.mark.parametrize("period", ["0", "-0.04", "0.045", "nan", "inf", "fast", "11"])
 def test_deltas_are_sent_every_so_many_ticks(period: str) -> None:
-    """The simulator rejects a delta period that is not a multiple of the tick, or is over 10 s."""
+    """The simulator rejects a delta period that is not a whole number of ticks, 1 tick to 10 s."""
     with pytest.raises(OptionError, match="not a period of the board"):
         board_from_url(f"sim://?delta_period={period}")
 
