@@ -47,13 +47,13 @@ PARAMETERS: Final = table(
         },
         "gyro_bias": {
             "description": "Reading of the gyro at rest, in its own axes. The driver subtracts it."
-            " The driver's tool `calibrate imu` measures it. The service ~/calibrate_gyro"
-            " calibrates the board itself, and then sets this parameter to 0."
+            " The tool `calibrate imu` measures it. The service ~/calibrate_gyro lets the board"
+            " calibrate its gyro instead, and then sets this parameter to 0."
         },
         "accel_bias": {
             "description": "Offset of the accelerometer, in its own axes. The driver subtracts it."
-            " The service ~/calibrate_accelerometer calibrates the board itself, and then sets"
-            " this parameter to 0."
+            " The service ~/calibrate_accelerometer lets the board calibrate its accelerometer,"
+            " and then sets this parameter to 0."
         },
         "linear_acceleration_stddev": {
             "description": "Standard deviation of one accelerometer sample, for the covariance."

@@ -102,10 +102,10 @@ WHEELS: Final = (
         "steering_gains",
         [1.0],
         "",
-        "Parameters of the steering controller, in the order in which the command `cssteer` takes"
-        " them. Proportional part: use, Kp. Integral part: useI, taui, ilimit, and the number 1."
-        " Lead filter: useLeadf, tz, tp. Second lead filter: useLeadb, tz, tp. Prefilter: usePre,"
-        " tz, tp. Output limit: useULim, Ulim. Unset: the board keeps its own values.",
+        "Values of the steering controller, in the order of the board's command `cssteer`."
+        " Proportional part: use, Kp. Integral part: useI, taui, ilimit, then always 1. Lead"
+        " filter: useLeadf, tz, tp. Second lead filter: useLeadb, tz, tp. Prefilter: usePre, tz,"
+        " tp. Output limit: useULim, Ulim. Unset: the board keeps its own values.",
         length=(1, MOST_GAINS),
         low=-1e6,
         high=1e6,
@@ -136,9 +136,9 @@ DRIVING: Final = (
         10.0,
         "s",
         "Time from ~/power_off until the board cuts the power. This computer loses power too if"
-        " the board supplies it. The driver sends whole seconds. It increases the time (131 s"
-        " instead of 120 s) if a loss of two digits could leave a valid command with another time."
-        " The answer of ~/power_off states the time in use.",
+        " the board supplies it. The driver sends whole seconds. It increases some times (131 s"
+        " instead of 120 s), because otherwise a command that lost two digits on the line could"
+        " set another time. The answer of ~/power_off states the time in use.",
         low=1.0,
         high=3600.0,
     ),
@@ -196,8 +196,8 @@ SENSORS: Final = (
         "orientation_stddev",
         [0.02, 0.02, 0.2],
         "rad",
-        "Standard deviation of roll, pitch and yaw in imu/data. A bias of the gyro makes the yaw"
-        " drift.",
+        "Standard deviation of roll, pitch and yaw in imu/data. The yaw needs a larger value: a"
+        " gyro bias makes it drift.",
         low=1e-6,
         high=10.0,
     ),

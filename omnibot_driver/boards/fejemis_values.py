@@ -67,8 +67,8 @@ def require_whole_settings(values: Mapping[str, Any]) -> None:
         values[name] is not None for name in (*_WHEELS, "steering_distance")
     ):
         raise ParameterError(
-            "parameter 'track' must be set together with others: either set 'steering_distance'"
-            " too, or set 'wheel_radii', 'gear' and 'encoder_ticks' too, or leave 'track' unset"
+            "parameter 'track' cannot be set alone: also set 'steering_distance', or also set"
+            " 'wheel_radii', 'gear' and 'encoder_ticks', or leave 'track' unset"
         )
 
 

@@ -71,8 +71,8 @@ DRIVING: Final = (
         "duty_scale",
         130.0,
         "%/(m/s)",
-        "Motor duty at which a wheel's rim moves at 1 m/s. It converts cmd_vel and wheel_cmd in"
-        " duty mode.",
+        "Motor duty at which a wheel's rim moves at 1 m/s. In duty mode, the driver converts"
+        " cmd_vel and wheel_cmd to motor duty with this value.",
         low=1.0,
         high=10_000.0,
         calibrated=True,
@@ -89,9 +89,9 @@ DRIVING: Final = (
         "low_pass",
         1.0,
         "",
-        "Low-pass filter of the commanded RPM (0x23): the fraction of a change that the speed"
-        " controller applies in each of its steps. The driver always writes it, because with 0,"
-        " the default of the public firmware, the wheels never turn.",
+        "Low-pass filter of the commanded RPM (0x23): the part of a change that takes effect in"
+        " each step of the speed controller. 1 turns the filter off. With 0, the default of the"
+        " public firmware, the wheels never turn. So the driver always writes this parameter.",
         low=0.001,
         high=1.0,
     ),
@@ -125,17 +125,18 @@ DRIVING: Final = (
         "terminal_mode",
         "host",
         "",
-        "What the board sends (0x11): its own messages (host), or the text lines of its GPS or"
-        " compass. The driver publishes these lines on ~/terminal. The driver stops the robot"
-        " before it changes the mode. It refuses motion in every mode except host.",
+        "What the board sends (0x11). host: its own messages; gps or compass: the text lines of"
+        " this sensor. The driver publishes these lines on ~/terminal. The driver stops the robot"
+        " before it changes the mode, and refuses motion in every mode except host.",
         choices=("host", "gps", "compass"),
     ),
     Parameter(
         "record_samples",
         200,
         "",
-        "Length of a record (~/record_rpm, ~/record_torque, ~/record_heading), in samples of each"
-        " wheel or in headings. The board never completes a record of more than 1024.",
+        "Length of a record: samples of each wheel (~/record_rpm, ~/record_torque), or headings"
+        " (~/record_heading). The limit is 1024, because the board never completes a longer"
+        " record.",
         low=1,
         high=MOST_SAMPLES,
     ),
@@ -177,7 +178,7 @@ def _setting(name: str, what: str) -> Parameter:
         name,
         1.0,
         _UNITS.get(name.partition("_")[2], ""),
-        f"{what}. If it is not set, the board keeps its own value.",
+        f"{what}. Unset: the board keeps its own value.",
         low=low,
         high=high,
         unset=True,
@@ -194,12 +195,14 @@ _WORDS: Final = {
     "tn": "Integral time Tn of the {} wheel's speed controller",
     "td": "Time constant Td of the {} wheel's speed controller",
     "short_correction": (
-        "The {} encoder's signal alternates between a short and a long level. The board multiplies"
-        " the measured duration of each short level by this factor"
+        "Factor by which the board multiplies the measured duration of each short level of the {}"
+        " encoder's signal. Short and long levels alternate. `calibrate step` finds the factors"
+        " that make them equal"
     ),
     "long_correction": (
-        "The {} encoder's signal alternates between a short and a long level. The board multiplies"
-        " the measured duration of each long level by this factor"
+        "Factor by which the board multiplies the measured duration of each long level of the {}"
+        " encoder's signal. Short and long levels alternate. `calibrate step` finds the factors"
+        " that make them equal"
     ),
     "feed_forward": "Feed-forward of the {} wheel's speed controller",
 }
@@ -228,7 +231,7 @@ def _period(
         low_s,
         "s",
         f"Period of the {what}{off}. The board cannot receive while it sends, so"
-        " with a shorter period it misses more commands. If it is not set, the board keeps its own"
+        " with a shorter period the board misses more commands. Unset: the board keeps its own"
         " value.",
         low=low_s,
         high=high_s,
@@ -259,8 +262,8 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """
     if values["terminal_mode"] != "host" and not values["checksum"]:
         raise ParameterError(
-            "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"
-            " the board expects checksums and would ignore a stop without one"
+            "parameter 'terminal_mode' must be host while 'checksum' is false: in the modes gps"
+            " and compass, the board expects checksums and would ignore a stop without one"
         )
 
 
@@ -271,9 +274,10 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(
-            f"parameter 'command_rate' must be at most {MOST_TERMINAL_RATE_HZ:g} Hz in a"
-            f" terminal_mode, not {values['command_rate']:g}: with more commands the board would"
-            " receive a stop late or never"
+            f"parameter 'command_rate' must be at most {MOST_TERMINAL_RATE_HZ:g} Hz while"
+            f" 'terminal_mode' is {values['terminal_mode']}, not {values['command_rate']:g}: in"
+            " this mode the board reads commands slowly; at a higher rate, it would receive a stop"
+            " late or never"
         )
 
 

@@ -27,9 +27,9 @@ def refuse_recordings(values: Mapping[str, Any]) -> None:
     if is_recording(values["port"]):
         raise ParameterError(
             f"port '{values['port']}' is not valid: a MART controller's recording cannot be"
-            " replayed, because its odometry depends on what the driver sent; play the recorded"
-            " odom with `ros2 bag play`, or run `ros2 run omnibot_driver report` on the bag; check"
-            " the parameter `board` too"
+            " replayed, because odom depends on what the driver sent; play the recorded odom with"
+            " `ros2 bag play`, or run `ros2 run omnibot_driver report` on the bag; if another board"
+            " made the bag, set the parameter `board`"
         )
 
 
@@ -55,15 +55,15 @@ PARAMETERS: Final = table(
             "description": "Not used by this board: a motion continues without repeated commands."
         },
         "odom_linear_scale": {
-            "description": "True distance divided by the distance that odom shows while this"
-            " parameter is 1. The driver multiplies measured distances by this ratio."
-            " Usually it stays 1, because `calibrate scale` corrects distances by metres_per_count."
+            "description": "Ratio of the true distance to the distance in odom, measured with this"
+            " parameter at 1. The driver multiplies measured distances by this ratio. Usually"
+            " leave it at 1, because `calibrate scale` corrects distances with metres_per_count."
         },
         "odom_angular_scale": {
-            "description": "True angle of a turn divided by the angle that odom shows after the"
-            " turn. To measure this ratio, set this parameter to 1. The driver multiplies the"
-            " angles of the controller's gyro by this ratio. During a turn on the spot, odom takes"
-            " the angle from the right wheel; the parameter track corrects that angle."
+            "description": "Ratio of the true angle of a turn to its angle in odom after the stop,"
+            " measured with this parameter at 1. The driver multiplies the angles of the"
+            " controller's gyro by this ratio. While the robot turns on the spot, odom uses the"
+            " right wheel, not the gyro. The parameter track corrects the right wheel's angle."
         },
         "port": {
             "default": "udp://192.168.1.50:5000",

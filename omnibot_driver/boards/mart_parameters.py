@@ -92,9 +92,9 @@ DRIVING: Final = (
         "network_delay",
         0.3,
         "s",
-        "Longest time that a datagram takes in either direction. If a late copy of an earlier"
-        " command could disturb a new command, the driver waits for this time before it sends"
-        " the new one.",
+        "Longest time that a datagram takes in either direction. The network can deliver a second,"
+        " late copy of a command. If this copy could disturb the next command, the driver first"
+        " waits for this time.",
         low=0.01,
         high=0.3,
     ),
@@ -102,9 +102,9 @@ DRIVING: Final = (
         "spin_speed",
         "custom",
         "",
-        "Speed of turns on the spot. custom: the commanded speed. The driver sets it with the"
-        " undocumented commands SSP and R CUSTOM. fixed: the controller's own speed SLOW, which"
-        " is faster than most commanded speeds.",
+        "Speed of turns on the spot. custom: the commanded speed, set with the undocumented"
+        " commands SSP and R CUSTOM; fixed: the controller's own speed SLOW (faster than most"
+        " commanded speeds). Set fixed for a server without SSP.",
         choices=("custom", "fixed"),
         fixed=True,
     ),

@@ -42,8 +42,8 @@ TIME_EVERY_S: Final = 1.0
 NO_DATA: Final = "no valid data from the controller; check its power and the network"
 ESTOP: Final = "the e-stop is latched; release it, then call again"
 NOT_AT_REST: Final = (
-    "no proof that the robot is at rest, or the server is busy; end the motion commands, wait a"
-    " second, then call again"
+    "the robot may still be moving, or the server is busy; end the motion commands, wait a second,"
+    " then call again"
 )
 
 

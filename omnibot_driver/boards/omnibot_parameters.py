@@ -28,8 +28,8 @@ OMNIBOT: Final = (
         "linear_scale",
         70.0,
         "LSB/(m/s)",
-        "Command value, in units of the board (LSB), for a linear speed of 1 m/s: the robot's"
-        " speed for cmd_vel, and the speed of a wheel's rim for wheel_cmd.",
+        "Command value, in units of the board (LSB), for 1 m/s. In cmd_vel, this is the speed of"
+        " the robot. In wheel_cmd, it is the speed of a wheel's rim.",
         low=1.0,
         high=10_000.0,
         calibrated=True,
@@ -84,7 +84,7 @@ OMNIBOT: Final = (
         True,
         "",
         "Correct the odometry with the board's own pose. If false, the driver uses that pose only"
-        " for the first heading, and to detect a restart of the board.",
+        " for the first heading of odom, and to detect a restart of the board.",
     ),
     Parameter(
         "pose_byte_order",

@@ -56,8 +56,8 @@ LINE: Final = (
         "reconnect_interval",
         0.5,
         "s",
-        "Time until the driver tries to open a lost port again. After each failure, this time"
-        " grows by half, up to 2 s. If this parameter is above 2 s, the time does not grow.",
+        "Time until the driver tries to open a lost port again. After each failure, the driver"
+        " waits 1.5 times as long, up to 2 s. With a value above 2 s, the wait is always the same.",
         low=0.05,
         high=60.0,
     ),
@@ -116,8 +116,9 @@ COMMANDS: Final = (
         "max_linear_acceleration",
         0.0,
         "m/s²",
-        "Largest acceleration (length of the vector) with which cmd_vel changes the linear"
-        " velocity. 0 turns the limit off. Zero commands and wheel_cmd are not limited.",
+        "Largest linear acceleration (length of the vector) that the driver commands for cmd_vel."
+        " 0 turns the limit off. The limit does not apply to a zero command (stop) or to"
+        " wheel_cmd.",
         low=0.0,
         high=100.0,
     ),

@@ -23,8 +23,8 @@ ROBOT: Final = (
         "odom_linear_scale",
         1.0,
         "m/m",
-        "True distance divided by the distance that odom shows while this parameter is 1. The"
-        " driver multiplies measured distances by this ratio. The command `calibrate geometry`"
+        "Ratio of the true distance to the distance in odom, measured with this parameter at 1."
+        " The driver multiplies measured distances by this ratio. The command `calibrate geometry`"
         " measures the ratio.",
         low=0.5,
         high=2.0,
@@ -34,8 +34,8 @@ ROBOT: Final = (
         "odom_angular_scale",
         1.0,
         "rad/rad",
-        "True angle of a turn divided by the angle that odom shows while this parameter is 1."
-        " The driver multiplies measured angles by this ratio. The command `calibrate geometry`"
+        "Ratio of the true angle of a turn to the angle in odom, measured with this parameter at"
+        " 1. The driver multiplies measured angles by this ratio. The command `calibrate geometry`"
         " measures the ratio.",
         low=0.5,
         high=2.0,
@@ -46,7 +46,7 @@ ROBOT: Final = (
         2.0,
         "m/s",
         "Highest linear speed that the robot can reach, even if it is pushed. The driver rejects"
-        " faster displacements, and never corrects odom faster than this speed. The value must"
+        " faster displacements. Corrections never move odom faster than this speed. The value must"
         " not be below max_linear_speed.",
         low=0.1,
         high=10.0,
@@ -65,9 +65,9 @@ ROBOT: Final = (
         15.0,
         "m/s²",
         "Highest linear acceleration that the robot can reach, even in a collision. The driver"
-        " rejects a displacement that differs from the previous one by more than this acceleration"
-        " permits, if the next displacement jumps back. docs/internals/architecture.md has the"
-        " exact rule (Implausible readings).",
+        " rejects a displacement if it jumps by more than this acceleration permits and the next"
+        " displacement is back at the old value. docs/internals/architecture.md has the exact rule"
+        " (Implausible readings).",
         low=0.1,
         high=1000.0,
     ),
@@ -76,9 +76,9 @@ ROBOT: Final = (
         50.0,
         "rad/s²",
         "Highest angular acceleration that the robot can reach, even in a collision. The driver"
-        " rejects a displacement or gyro reading that differs from the previous one by more than"
-        " this acceleration permits, if the next one jumps back. docs/internals/architecture.md"
-        " has the exact rule (Implausible readings).",
+        " rejects a displacement or a gyro reading if it jumps by more than this acceleration"
+        " permits and the next displacement or reading is back at the old value."
+        " docs/internals/architecture.md has the exact rule (Implausible readings).",
         low=1.0,
         high=10_000.0,
     ),
@@ -86,9 +86,9 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "Largest change of an accelerometer axis, from one reading to the next, that is always"
-        " accepted. The driver rejects a reading only if the change is larger, the next reading"
-        " jumps back, and a flipped bit can explain the change."
+        "Largest change of an accelerometer axis from one reading to the next that the driver"
+        " always accepts. The driver rejects a larger change only under two conditions: a flipped"
+        " bit can explain it, and the next reading is back at the old value."
         " docs/internals/architecture.md has the exact rule (Implausible readings).",
         low=0.1,
         high=1000.0,
@@ -156,8 +156,8 @@ NOISE: Final = (
         "odom_wheel_drift",
         0.0035,
         "m/√m",
-        "Standard deviation of a wheel's distance after 1 m. It grows with the square root of the"
-        " distance.",
+        "Standard deviation of the error of a wheel's distance after 1 m. This deviation grows"
+        " with the square root of the distance.",
         low=1e-6,
         high=10.0,
     ),

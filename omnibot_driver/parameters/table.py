@@ -156,7 +156,9 @@ def table(
     }
     common = {row.name for rows in COMMON.values() for row in rows}
     if unknown := {*without, *changes} - common:
-        raise ValueError(f"these are not common parameters: {', '.join(sorted(unknown))}")
+        raise ValueError(
+            f"only parameters in COMMON can be changed or omitted, not {', '.join(sorted(unknown))}"
+        )
     if kept := sorted({*without} - DISPENSABLE):
         raise ValueError(
             f"the board {board} must have the parameters {', '.join(kept)}, because the driver"

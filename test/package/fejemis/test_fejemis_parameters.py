@@ -65,7 +65,7 @@ def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: 
 
 def test_a_track_alone_is_refused() -> None:
     """The driver refuses ``track`` alone: two commands contain it, and both need further values."""
-    with pytest.raises(ParameterError, match="set 'steering_distance' too"):
+    with pytest.raises(ParameterError, match="also set 'steering_distance'"):
         check(track=0.4)
 
 

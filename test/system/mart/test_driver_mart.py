@@ -75,7 +75,7 @@ class Mart:
 
     def answer_at_rest(self, probe: Probe, service: str) -> Any:
         """Call the service until the driver knows that the robot is at rest; return the answer."""
-        return self.answer(probe, service, while_refused="no proof that the robot is at rest")
+        return self.answer(probe, service, while_refused="the robot may still be moving")
 
     def answer(self, probe: Probe, service: str, while_refused: str = "refused") -> Any:
         """Call the service once a second, as long as its answer contains ``while_refused``.
