@@ -264,7 +264,8 @@ def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
 def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
     """LOG (start of a log) is lost, and a copy of an earlier ``ok`` arrives.
 
-    The driver knows that no log was started, and refuses a download, which would end the server.
+    The driver does not take the copy for the reply to LOG, so it refuses a download, which would
+    end the server.
     """
     bench = MartBench().ready()
     assert bench.job(Job.BIAS).success

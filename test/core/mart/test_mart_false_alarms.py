@@ -139,9 +139,9 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """A turn on the spot has a wrong rate, so the driver starts the turn again.
+    """A turn on the spot (L) has a wrong rate. Before each start, the motors get new units (SSP).
 
-    Before each start (L), the driver sets new motor units (SSP).
+    The robot is heavy, or replies are late, so the driver may not get the angle of the turn.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

@@ -114,7 +114,7 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
     """The goal is 30 m away, and the first move is stopped after 80 s (about 20 m).
 
-    The stop sets the count of moves to zero, so the goal is reached despite the limit of moves.
+    The driver then counts the moves from zero again, and the robot reaches the goal.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)

@@ -152,7 +152,7 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""
     network = bench.robot.network[0]
     real = network.from_board.send
-    # The server needs 0.3 s to stop a second run, so a reply after 0.28 s shows that there is none.
+    # The server needs at least 0.3 s to stop a second run, so a reply after 0.28 s excludes one.
     network.from_board.send = lambda data, at_s: real(data, at_s + 0.28)
     pilot = bench.board._pilot
     drops(network.to_board, lambda data: data == b"HELLO" and pilot.state is State.MOVING)

@@ -152,7 +152,8 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
 def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
     """Return a test bench whose driver starts while RM turns the robot about its right wheel.
 
-    For the first ``away_s`` seconds, the driver gets no reply, so it finally uses the stop port.
+    For the first ``away_s`` seconds, the network loses everything, so the driver finally uses the
+    stop port.
     """
     bench = MartBench(firmware)
     bench.server.receive(b"RM 30", 0, None, 0.0)

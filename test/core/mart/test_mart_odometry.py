@@ -33,8 +33,8 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
     """Return a test bench after two motions that end with equal encoder counts.
 
-    The network loses all replies in each motion, and ``quiet_s`` seconds longer. This function
-    checks the covariance after each motion.
+    No reply arrives from the start of each motion until ``quiet_s`` seconds after its stop begins.
+    The covariance is checked after each motion.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -191,7 +191,7 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 
 
 def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
-    """A copy of an older reply ``ok`` seems to confirm a motion, but the encoder count stays.
+    """A copy of an older reply ``ok`` seems to confirm a motion, but the count is unchanged.
 
     The odometry adds no motion.
     """

@@ -63,7 +63,7 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the driver: directly after a stop by the stop port (SL), it sends the stops SRM and SM.
+    """Patch the driver: directly after a stop by the stop port, it sends the stops SRM and SM.
 
     Without the patch, the driver first finds out which motion is in progress.
     """

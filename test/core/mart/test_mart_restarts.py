@@ -134,7 +134,8 @@ def test_motors_that_run_on_after_a_controlled_move_are_switched_off_before_the_
 def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_s: float) -> None:
     """The server restarts within 50 ms in a turn on the spot, and the driver does not notice.
 
-    The driver sends no VOLTS (voltage query), which would crash a server that is starting up.
+    In such a turn, the driver sends no VOLTS (voltage query), which would crash a server that is
+    starting up.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.5, 2.0)

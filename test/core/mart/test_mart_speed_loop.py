@@ -180,10 +180,10 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """On a slow network, the driver changes motor units by at most 15 forward, and 5 backward.
+    """On a slow network, one change is at most 15 motor units forward, and 5 backward.
 
     A change that the network delivers twice must be small, above all backward, where the driver may
-    not notice.
+    not notice that.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

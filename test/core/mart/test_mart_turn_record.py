@@ -59,12 +59,12 @@ def lose_once(bench: MartBench, begins: bytes) -> None:
 
 
 def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -> list[float]:
-    """Let the network duplicate the next ``request``, and delay the reply to the duplicate.
+    """Let the network duplicate the next ``request``, and delay files after the duplicate.
 
     The returned list gets the duplicate's arrival time.
 
     * ``after_s``: time in s from the request to the duplicate.
-    * ``late_s``: additional delay in s of the file that answers the duplicate.
+    * ``late_s``: additional delay in s of files sent after the duplicate's arrival.
     """
     copied_s: list[float] = []
     there, back = bench.robot.network[0].to_board, bench.robot.network[0].from_board
