@@ -72,7 +72,7 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
     """A command may wait in the middleware during several stalls of the driver.
 
-    The driver refuses every command that was sent before the end of the last stall.
+    Until 10 s after the last stall, the driver refuses every command that was sent before its end.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)

@@ -150,10 +150,7 @@ class Bench:
         self.session.configure(self.settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def last_words(self, on_exit: OnExit) -> bytes:
-        """Return the bytes that the driver writes in its shutdown sequence.
-
-        After these bytes, the driver closes the port.
-        """
+        """Return the last bytes that the driver writes at shutdown, before it closes the port."""
         return joined(self.session.shutdown.sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:

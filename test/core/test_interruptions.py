@@ -88,7 +88,7 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
-    """A paused board restarts at rest, and the driver misses its frames for 4 s.
+    """A paused board restarts at rest. No frame arrives until the board has run for 4 s.
 
     The first delta that arrives has a higher count than the last delta before the pause. Odom does
     not move to the new origin.

@@ -133,7 +133,7 @@ node.OmniBotDriver._on_estop_topic = hold
 join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20 * timeout)
 """
-"""Code for the driver's process: a callback blocks the executor until the driver ends.
+"""Code for the driver's process: a callback blocks the executor until the driver asks it to end.
 
 The code also makes the driver wait 20 times longer than usual for its threads to end.
 """

@@ -158,8 +158,8 @@ def test_operators_and_observers_may_read_all_commands(file: str) -> None:
 def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> None:
     """A node of each enclave may offer the services that every rclpy node has.
 
-    Only the driver's and the operator's enclaves may offer others, so no other node can answer in
-    the driver's name.
+    Except for the driver and the operator, it may offer services only under its own name, so it
+    cannot answer in the driver's name.
     """
     for path, profile in profiles(POLICY.with_name(f"{file}.policy.xml")).items():
         name = "monitor_1" if path == "/omnibot/operator" else profile.attrib["node"]

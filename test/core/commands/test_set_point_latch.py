@@ -74,7 +74,7 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
     """A node requests the e-stop a thousand times in one second.
 
-    The driver sends the e-stop only 20 times in this second, to spare the line.
+    The driver sends the e-stop only about 20 times in this second, to spare the line.
     """
     written = []
     for step in range(1000):

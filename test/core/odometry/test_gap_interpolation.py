@@ -201,9 +201,10 @@ def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> No
 
 
 def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
-    """The robot drives 2 m forward, then 2 m back. A restart before each drive hides a turn.
+    """By odom, the robot drives 2 m forward, then 2 m back. It may have turned before each drive.
 
-    The errors of the two drives do not cancel, so x is uncertain by more than 1 m.
+    A restart of the board hides such a turn. The errors of the two drives do not cancel, so x is
+    uncertain by more than 1 m.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))

@@ -174,7 +174,7 @@ def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """The board's delta counter restarts at 0. By chance, 0 also continues the old count.
+    """The delta counter restarts at 0. By chance, 0 also fits the old count and the elapsed time.
 
     The counter of the next pose is also 0, which shows the restart.
     """

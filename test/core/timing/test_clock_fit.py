@@ -17,8 +17,8 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: return the bounds of the time of a numbered tick, relative to its true
-    time, in s.
+    ``above``, ``below``: return the upper and the lower bound of the time of the tick with this
+    number, relative to its true time, in s.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
@@ -83,9 +83,9 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """A late read makes a lower bound of the fitted clock later than the upper bounds.
+    """Late reads give lower bounds that contradict the upper bounds of other ticks.
 
-    The clock discards the lower bound, because upper bounds are always right.
+    The clock discards the lower bounds, because upper bounds are always right.
     """
     _, late_s = followed(
         0.0,
