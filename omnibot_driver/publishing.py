@@ -60,9 +60,9 @@ class Publishing:
         if strange := difference(settings):
             self._maker = Messages
             node.get_logger().warning(
-                f"on this computer, rclpy serialises {strange} differently from the driver; so"
-                " the driver lets rclpy serialise its messages, which costs a little more"
-                " processor time"
+                f"on this computer, rclpy serialises {strange} differently from the driver. So"
+                " rclpy serialises the messages now, instead of the driver. This costs a little"
+                " more processor time"
             )
         self.settings = settings
         self._port, self._channels = values["port"], traits.channels

@@ -146,7 +146,7 @@ class Replay:
         if pause_s > LONGEST_PAUSE_S:
             notice = Notice(
                 f"the recording has no data for {pause_s:.0f} s here, or the recorder's clock was"
-                f" set; the replay skips all but {LONGEST_PAUSE_S:.0f} s of it"
+                f" set; the replay skips all but {LONGEST_PAUSE_S:.0f} s of this pause"
             )
             self._tell(partial(self._deliver, [notice], self._epoch_ns))
             if not self._tick_until(self._now + LONGEST_PAUSE_S):

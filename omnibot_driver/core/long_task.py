@@ -66,7 +66,7 @@ class LongTask:
         ``driven``: whether a command drives the robot now.
         """
         if self._driven and not driven:
-            self.give_up("the robot was stopped meanwhile; call again")
+            self.give_up("the robot was stopped during the request; call again")
         self._driven = driven
 
     def tick(self, now: float) -> None:

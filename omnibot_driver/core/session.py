@@ -164,7 +164,7 @@ class Session:
         self.inbound.end(now)
         self.interlocks.missing = self._reporter.missing = ""
         why = self.interlocks.why_not_request()  # empty unless the driver shuts down
-        why = why or "the port was lost meanwhile; call again once it is back"
+        why = why or "the port was lost during the request; call again once it is back"
         for given_up in (self._mode_manager.closed, self._calibration.give_up, self._task.give_up):
             given_up(why)
         self._commands.discard(now)

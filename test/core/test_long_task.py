@@ -70,7 +70,7 @@ def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
 
 ENDS: dict[str, Callable[[AnyBench], object]] = {
     "stopped": lambda bench: bench.drive(0.0),
-    "stopped meanwhile": lambda bench: bench.run(0.6),
+    "stopped during the request": lambda bench: bench.run(0.6),
     "e-stop": lambda bench: bench.estop(True),
     "port was lost": lambda bench: bench.close(),
     "check its power and cable": lambda bench: (setattr(bench, "speaks", False), bench.run(5.0)),

@@ -281,8 +281,8 @@ class CommandPipeline:
         self.policy.halt(now)
         ended = "the goal of cmd_pose is discarded" if goal else f"the {motion} is cancelled"
         return [
-            f"{ended}: cmd_vel commanded the robot to stand still; this command was refused, but it"
-            f" still ends the {motion}"
+            f"{ended}: cmd_vel commanded the robot to stand still. Such a command ends the"
+            f" {motion} even if it is refused, like this one"
         ]
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
@@ -295,8 +295,8 @@ class CommandPipeline:
             return []
         if goal.alignment != self._odometry.alignments:
             why = (
-                "the origin or a scale of odom has changed, by ~/reset_odometry, a restart of the"
-                " board, `odom_linear_scale` or `odom_angular_scale`"
+                "the origin or a scale of odom has changed (cause: ~/reset_odometry, a restart of"
+                " the board, `odom_linear_scale` or `odom_angular_scale`)"
             )
         elif self.obeys and any(
             goal.is_left_by(estimate.pose)

@@ -301,7 +301,7 @@ class FejemisBoard(Board):
         The packets also switch brush and lift off.
         """
         self._obedience.pause()
-        self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
+        self._upkeep.jobs.interrupt("the robot was paused during the request; call again")
         self._upkeep.machine.off()
         return self.stop() + self.emergency_stop()
 

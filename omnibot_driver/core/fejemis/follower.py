@@ -24,7 +24,7 @@ UNTIL_IT_MOVES: Final = (
     " refused until the wheel has moved, or ~/start is called"
 )
 UNTIL_START: Final = (
-    "the front wheel did not go where it was commanded, for the second time within 60 s; check the"
+    "for the second time within 60 s, the front wheel did not go where it was commanded; check the"
     " servo and its power. If the robot was driving backward, set `allow_reverse` to false. Then"
     " call ~/start"
 )

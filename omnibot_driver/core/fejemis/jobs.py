@@ -22,7 +22,10 @@ from omnibot_driver.core.fejemis.messages import (
 )
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
-POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
+POWER_ENDS: Final = (
+    "~/power_off was called, so the board is about to cut the power; call ~/start to keep the"
+    " power on"
+)
 """The reason for refusing motion, brush and lift after a requested power-off."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose ASCII codes add up to 99.
@@ -171,7 +174,7 @@ class Jobs:
 
         A requested power-off stays in force, because the board may already have received it.
         """
-        self.cancel("the port was lost meanwhile; call again once it is back")
+        self.cancel("the port was lost during the request; call again once it is back")
 
     def due(self, now: float) -> Lines:
         """Return the lines to send now, by board."""
@@ -255,7 +258,7 @@ class Jobs:
         elif after_s > UNCHANGED_S:
             self._finish(
                 False,
-                f"{job.value} failed: the offsets are unchanged: {shown}. Either the drive board"
+                f"{job.value} failed: the offsets {shown} are unchanged. Either the drive board"
                 " did not receive the command, or its firmware does not know it; call again",
             )
 
@@ -269,8 +272,8 @@ class Jobs:
         then = "call again"
         if self.job is Job.POWER_OFF:
             then = (
-                "the board may still cut the power. To keep the power on, call ~/start. To switch"
-                " it off, call ~/power_off again"
+                "the board may still cut the power. To keep the power on, call ~/start; to cut"
+                " it, call ~/power_off again"
             )
         self._finish(False, f"{self.job.value} was not confirmed by {which}; {then}")
 

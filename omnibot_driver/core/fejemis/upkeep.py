@@ -150,24 +150,25 @@ class Upkeep:
                 )
         for channel, half in enumerate(self._ports.halves):
             if half.decoder.contradicted:
+                without = "without" if self._settings.line_sums == "on" else "with"
                 return (
                     f"the parameter `line_sums` is {self._settings.line_sums}, but the lines of"
-                    f" the {self._ports.role(channel)} board show the opposite: set `line_sums` to"
-                    " auto"
+                    f" the {self._ports.role(channel)} board come {without} checksums: set"
+                    " `line_sums` to auto"
                 )
             if unknown := half.unknown_streams:
                 return (
-                    f"the firmware of the {half.role} board does not know {', '.join(unknown)},"
-                    " so this data is missing; update the firmware"
+                    f"the firmware of the {half.role} board does not know {', '.join(unknown)}"
+                    " and cannot send this data; update the firmware"
                 )
         one, other = (self.configurations[role].geometry for role in ROLES)
         told = Written.STEERING not in self._settings.written  # else `failed` reports it
         if told and one and other and _differ(one, other):
             return (
-                "the boards are configured to different steering geometries (confs): drive has"
-                f" track {one.track_m:g} m and steering distance {one.wheelbase_m:g} m, front has"
-                f" track {other.track_m:g} m and steering distance {other.wheelbase_m:g} m; set"
-                " both with the parameters `track` and `steering_distance`"
+                "the boards are configured to different steering geometries (confs). Drive board:"
+                f" track {one.track_m:g} m, steering distance {one.wheelbase_m:g} m. Front board:"
+                f" track {other.track_m:g} m, steering distance {other.wheelbase_m:g} m. Set the"
+                " parameters `track` and `steering_distance`, which configure both boards"
             )
         return None
 

@@ -178,7 +178,7 @@ def encode_report(report: Report) -> bytes:
         case Record():
             return _encode_record(report)
         case LostRecord():
-            raise FrameError("a LostRecord cannot be encoded: its samples are lost")
+            raise FrameError("a record whose samples are lost (LostRecord) cannot be encoded")
         case TerminalLine(text):
             return text.encode("latin-1") + b"\r\n"
 

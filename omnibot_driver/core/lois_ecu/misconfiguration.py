@@ -20,10 +20,10 @@ GAINS: Final = (
 )
 """Gains of the speed controllers. The board does not report their values."""
 OWN_GAINS: Final = (
-    "the speed controllers run with the board's own {}. With the gains of the public firmware a"
-    " wheel oscillates, so the robot does not hold its course. Even if the wheels have the"
-    " configured size, odometry after 5 m is wrong by 0.04 m on average, by at most 0.16 m in"
-    " nearly all drives, and by 2.2 m in one of 150. Run `calibrate step`, or set these parameters"
+    "the speed controllers run with the board's own {}. Run `calibrate step`, or set these"
+    " parameters. The gains of the public firmware make a wheel oscillate, so the robot does not"
+    " hold its course. Odometry after 5 m is then wrong by 0.04 m on average (by at most 0.16 m in"
+    " nearly all drives, and by 2.2 m in one of 150), even with wheels of the configured size"
 )
 """Advice if the user has not set all gains; the braces stand for the names of the missing gains.
 
@@ -132,7 +132,10 @@ def _advice(seen: bytes) -> str:
             return "lines arrive without checksums; set the parameter `checksum` to false"
         if usual == 14:
             return "lines arrive with wrong checksums; check the cable and the baud rate"
-        return f"lines of {usual} characters come instead of 14: this is another firmware or board"
+        return (
+            f"lines of {usual} characters come instead of lines of 14: this is another firmware or"
+            " board"
+        )
     if sum(byte > 126 for byte in seen) > len(seen) / 10:
         return "the bytes are not text: check baudrate (115200), and that the port is the ECU's"
     return "no valid line of this board; check that the port is the ECU's"

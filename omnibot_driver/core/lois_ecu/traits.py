@@ -40,8 +40,8 @@ TRAITS: Final = Traits(
             " that were set, or in duty mode `duty_scale`"
         ),
         Fault.HELD_BY_ESTOP: (
-            "check motor power, and whether the e-stop button is held: the driver can miss a"
-            " press or a release, because the board reports each only once"
+            "check motor power, and whether the e-stop button is held. The board reports each"
+            " press and each release only once, so the driver can miss one"
         ),
     },
 )

@@ -149,7 +149,7 @@ class MartBoard(Board):
 
         Return all readings that were not taken yet, among them the result of the job.
         """
-        self._pilot.jobs.cancel("the port was lost meanwhile; call again once it is back")
+        self._pilot.jobs.cancel("the port was lost during the request; call again once it is back")
         return self._pilot.take()
 
     def elapse(self, now: float) -> list[Reading]:

@@ -134,7 +134,7 @@ class Ground:
     def connect(self) -> None:
         """Begin a new connection. The robot may be moving, so its state is unknown."""
         self.conversation.connect()
-        self.jobs.cancel("the connection was lost meanwhile; call again once it is back")
+        self.jobs.cancel("the connection was lost during the request; call again once it is back")
         self.jobs.forget_log()
         self.odometry.connect()
         self._switch_off.connect()

@@ -260,9 +260,8 @@ class Health:
             )
         if self.outlived:
             return (
-                "the connection to the server was lost, and the server answers again without a"
-                " restart. The stop of the next motion can fail: restart the server, then the"
-                " driver"
+                "the server answers again after the loss of its connection, but was not restarted."
+                " It may not obey the next stop: restart the server, then the driver"
             )
         if self._defective:
             return (

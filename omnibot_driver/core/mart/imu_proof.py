@@ -85,8 +85,9 @@ class ImuProof:
         if self._early < EARLY:
             return ""
         return (
-            f"no motion starts: the server answers {self.request.data.decode()} in less than"
-            f" {self.word.least_s:g} s, too fast for a check of the IMU: update the server"
+            "the driver starts no motion, because the IMU is not checked: the server answers"
+            f" {self.request.data.decode()} in less than {self.word.least_s:g} s, but the check"
+            " takes longer; update the server"
         )
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:

@@ -81,8 +81,8 @@ FILES_BEGIN: Final = {
 }
 """What the user must do to get a file of the last move or turn, if the controller has none."""
 UNPROVED: Final = (
-    "the pieces of this file may be in a wrong order: compare it with the controller's own file,"
-    " before ~/start_log deletes that"
+    "the pieces of the downloaded file may be in a wrong order: compare it with the original on the"
+    " controller, before ~/start_log deletes the original"
 )
 
 
@@ -155,14 +155,14 @@ class Jobs:
             )
         if job is Job.LOG_FILE and not self.logging:
             raise RequestRefused(
-                "no log was started: call ~/start_log first; without a log, this request"
-                " would end the server without sending a file"
+                "no log was started: call ~/start_log first. Otherwise ~/download_log ends the"
+                " server, which then sends no file"
             )
         if job is Job.LOG_FILE and self.log_may_be_lost:
             raise RequestRefused(
-                "the server may have been restarted and may no longer keep a log; without a log,"
-                " this request would end the server without sending a file. Copy the old file from"
-                " the controller, or call ~/start_log, which deletes it and begins a new log"
+                "the server may have been restarted and may no longer keep a log. Then"
+                " ~/download_log would end the server, which sends no file. Copy the old log from"
+                " the controller, or call ~/start_log to delete the old log and begin a new one"
             )
         self.job, self._token, self.turn_record = job, token, None
         self._request = WORD_OF[job].request(*arguments)

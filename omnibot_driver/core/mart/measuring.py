@@ -81,7 +81,9 @@ class Measuring(Starts):
         changed = self.odometry.turned(degrees, when)
         if self.state is State.DRIVING and not abs(math.radians(degrees)) < MOST_RAD:
             self._halt(
-                now, "the controller's clock was set, so its relative heading cannot be used"
+                now,
+                "the server computes the relative heading with the controller's clock, and this"
+                " clock was set; the driver begins the drive again",
             )
         return changed
 

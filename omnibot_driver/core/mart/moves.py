@@ -30,8 +30,8 @@ The error is a standard deviation, as a fraction of the move.
 """
 RAN_TWICE: Final = (
     "the network has delivered a controlled move twice, and the driver has stopped the second run"
-    " of the move. The first run was not measured, so `odom` contains the expected distance or turn"
-    " of the move instead: check the network"
+    " of the move. The first run was not measured; for it, `odom` uses the expected distance or"
+    " turn of the move: check the network"
 )
 CONTRADICTED: Final = (
     "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: "
@@ -257,8 +257,8 @@ class Moves(Asking):
         self._move.fail()
         self._notice(
             "the server did not answer in time after a controlled move. The network may have"
-            " delivered the move twice, so the driver has stopped a possible second run. The driven"
-            " distance is unknown, so the goal of cmd_pose is discarded: check the network, then"
-            " send the goal again",
+            " delivered the move twice, so the driver has sent a stop. The driven distance is"
+            " unknown, so the goal of cmd_pose is discarded: check the network, then send the goal"
+            " again",
             halt=True,
         )

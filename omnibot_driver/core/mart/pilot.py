@@ -51,7 +51,9 @@ SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 * ``SILENT_AFTER_MOVE_S``: since the last reply, if a duplicate of a move may be running.
 * ``GREET_AGAIN_S``: since the last HELLO.
 """
-COMMANDED: Final = "a motion command or a stop arrived; stop sending commands, then call again"
+COMMANDED: Final = (
+    "a motion command or a stop arrived during the request; stop sending commands, then call again"
+)
 ESTOPPED: Final = "the e-stop was latched during the request; release it, then call again"
 COPY_S: Final = 0.25
 """Time in s after a controlled move within which the server must answer a query (ENC or HELLO).

@@ -64,9 +64,9 @@ JUST_SET_S: Final = 2.0
 SLOW_UNITS: Final = 20
 """Motor units of the server's speed SLOW, in backward drives (B) and in turns on the spot."""
 SETTING_REFUSED: Final = (
-    "the server does not accept a speed for turns on the spot, so it makes all of them at its"
-    " own speed SLOW, which is faster than most commanded turns; set `spin_speed: fixed` if you"
-    " accept this speed (reported once)"
+    "the server does not accept a speed for turns on the spot. It makes every such turn at its own"
+    " speed SLOW, which is faster than most commanded turns. If you accept this, set `spin_speed:"
+    " fixed`, and this message does not return (reported once)"
 )
 
 

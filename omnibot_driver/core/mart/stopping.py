@@ -42,9 +42,9 @@ By then, the move has usually ended.
 """
 
 SLOW_STOP: Final = (
-    "the wheels still turned 0.6 s after the server's stop: the robot is heavy or fast, or rolls"
-    " down a slope, or the server has left a motor on; the motors are off now, and the"
-    " driver continues"
+    "the wheels still turned 0.6 s after the server's stop. The motors are off now, and the driver"
+    " continues. Possible causes: a heavy or fast robot, a slope, or a motor that the"
+    " server left on"
 )
 NO_START_S: Final = 0.75
 """Time in s after which the reply to a controlled turn (MCR, MCL) proves that a wheel has turned.

@@ -25,7 +25,7 @@ STRANGE_ROUNDS: Final = 6
 """Number of stop commands after which the driver reports an unexpected reply to a stop."""
 STRANGE: Final = (
     "the server answers a stop by '{}', so the driver does not know whether a motion is in"
-    " progress, and starts none; the driver expects 'fail no motion in progress' (SRM) and"
+    " progress, and starts no motion. The driver expects 'fail no motion in progress' (SRM) and"
     " 'fail no motion' (SM): check that the server is a MART controller, and update it"
 )
 NAMES: Final = {

@@ -27,9 +27,9 @@ MOST_MISSES, MOST_MISSES_DISTURBED = 4, 8
 ``MOST_MISSES_DISTURBED`` applies in a network that loses other replies, too.
 """
 NO_MCS: Final = (
-    "the server does not answer MCS, so the driver cannot switch off a motor that the server leaves"
-    " on after a straight move: if the robot creeps, command a turn on the spot, or cut the"
-    " motor power"
+    "the server does not answer MCS, the command by which the driver switches the motors off. If"
+    " the server leaves a motor on after a straight move, the robot creeps: then command a turn on"
+    " the spot, or cut the motor power"
 )
 
 

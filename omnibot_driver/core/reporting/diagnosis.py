@@ -81,7 +81,9 @@ class Diagnosis:
             level, message = Level.STALE, "the port is being opened"
         elif self._recent.grew("reconnects", reconnects, now):
             level = Level.WARN
-            message = "the port was lost and is open again: check cable, hub and power"
+            message = (
+                "the port was lost, but is open again; to prevent this, check cable, hub and power"
+            )
         values = {
             "Port": link.port,
             "Connected": _yes(bool(link.opened) and not link.trouble),
@@ -141,11 +143,11 @@ class Diagnosis:
         ):
             level = Level.WARN
             message = (
-                f"rates are wrong: the reader waits {waiting:.0%} of the time for the processor;"
-                " this computer is too busy: reduce its load"
+                f"frames arrive at wrong rates: the driver's reader waits {waiting:.0%} of the time"
+                " for the processor; this computer is too busy: reduce its load"
                 if waiting > BUSY_SHARE
-                else "rates are wrong: bytes are lost, or this computer is too busy to read them;"
-                " check cable, hub and load"
+                else "frames arrive at wrong rates: bytes are lost, or this computer is too busy to"
+                " read them; check cable, hub and load"
             )
         elif overran:
             level = Level.WARN
@@ -163,7 +165,7 @@ class Diagnosis:
             )
         elif waiting > BUSY_SHARE:
             message = (
-                "measurements are complete, but read late: the reader waits"
+                "measurements are complete, but read late: the driver's reader waits"
                 f" {waiting:.0%} of the time for the processor"
             )
         values = {
@@ -238,7 +240,10 @@ class Diagnosis:
             level, message = Level.WARN, f"lately: {refusals.last}"
         elif too_large:
             level = Level.WARN
-            message = "speeds exceed the range of a command; lower the scales or the speed limits"
+            message = (
+                "commanded speeds exceed the largest number in a command to the board; lower the"
+                " scales or the speed limits"
+            )
         elif commands.source is None:
             message = "idle"
         elif limited:
@@ -282,7 +287,7 @@ class Diagnosis:
         elif imu.advice:
             level, message = Level.WARN, imu.advice
         elif imu.gravity_mps2 is None:
-            message = "measuring; waiting for the robot to be at rest"
+            message = "measuring; gravity is not known until the robot is at rest"
         values = {
             "Gravity (m/s²)": "none" if imu.gravity_mps2 is None else f"{imu.gravity_mps2:.3f}",
             "Gyro bias (rad/s)": _numbers(imu.bias_radps),

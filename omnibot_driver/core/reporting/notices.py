@@ -15,7 +15,8 @@ from omnibot_driver.core.measurement.outlier_filter import Refused
 NEWS_S: Final = 10.0
 """Shortest time in s between two notices about the same counter."""
 HEADING_ASSUMED: Final = (
-    "the board sends no valid pose; the driver assumes that the board's heading began at 0"
+    "the board sends no valid pose, so the driver assumes that the board's heading began at 0; if"
+    " the robot has turned since the board started, restart the board"
 )
 
 SIDEWAYS: Final = (
@@ -30,8 +31,8 @@ STOP_UNSEEN: Final = (
     " Stop for 5 s after each stop; check by eye that the robot has stopped"
 )
 STOP_BLIND: Final = (
-    "stop unconfirmed: the board measures its wheels only after some motion commands, and not after"
-    " the last one; check by eye that the robot has stopped (reported once)"
+    "stop unconfirmed: the board does not measure its wheels after commands like the last one;"
+    " check by eye that the robot has stopped (reported once)"
 )
 STOP_UNANSWERED: Final = (
     "stop unconfirmed: the board is not responding; if the robot moves, cut its motor power; then"

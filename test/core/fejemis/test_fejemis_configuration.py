@@ -262,7 +262,7 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
     bench.open()
     bench.run(4.0)
     assert bench.session.state == "connecting"
-    assert any("show the opposite" in text for text in bench.notices)
+    assert any("come with checksums" in text for text in bench.notices)
 
 
 def test_a_board_that_is_not_known_yet_is_named_by_its_port() -> None:
@@ -273,7 +273,7 @@ def test_a_board_that_is_not_known_yet_is_named_by_its_port() -> None:
     board = FejemisBoard(FejemisSettings(line_sums="on"))
     board.connect()
     board.receive(b"pose 1.0 0.0 0.0 0.0\n", 1000.0, DRIVE)
-    assert "the lines of the drive board" in (board.advice or "")
+    assert "the lines of the drive board come without checksums" in (board.advice or "")
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:

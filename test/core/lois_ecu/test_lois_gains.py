@@ -43,7 +43,8 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
     """
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)
-    assert "0.16 m in nearly all drives, and by 2.2 m in one of 150. Run `calibrate" in sentence
+    assert "0.16 m in nearly all drives, and by 2.2 m in one of 150" in sentence
+    assert "Run `calibrate step`, or set these parameters" in sentence
     assert bench.session.board.figures.own["Gains"].startswith(
         "left_kp, left_tn, left_td, right_kp"
     )

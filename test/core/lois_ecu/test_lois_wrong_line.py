@@ -22,7 +22,7 @@ WRONG = {
     "NMEA": (NMEA, "NMEA sentences"),
     "noise": (Random(1).randbytes(500), "the bytes are not text: check baudrate"),
     "too short": (SHORT, "lines arrive without checksums"),
-    "too long": (LONG, "lines of 16 characters come instead of 14"),
+    "too long": (LONG, "lines of 16 characters come instead of lines of 14"),
     "a wrong checksum": (SUMLESS_SUM, "lines arrive with wrong checksums"),
 }
 

@@ -206,7 +206,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
         robot.connect(waited_s=0.3 * second)
         robot.seconds(1)
     assert not robot.troubles
-    assert "read late: the reader waits 30%" in robot.statuses["Stream"].message
+    assert "read late: the driver's reader waits 30%" in robot.statuses["Stream"].message
     robot.per_second["imu"] = 60
     for second in range(12, 24):
         robot.connect(waited_s=0.3 * second)
