@@ -59,8 +59,8 @@ class Profile(Protocol):
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
         """Create the board's own topics and services, and return its publishing functions.
 
-        There is one function for each type of reading that only this board has. Called once, on the
-        executor's thread, before any bytes arrive.
+        There is one function for each type of reading that only this board has. Call ``extras``
+        once, on the executor's thread, before any bytes arrive.
         """
 
 

@@ -143,9 +143,9 @@ class FejemisCommands:
             self._warn(trouble)
 
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
-        """Call ``action``; return an empty string, the reason for a refusal, or a warning.
+        """Call ``action``; return the reason for a refusal, a warning, or an empty string.
 
-        ``off``: whether ``action`` switches a device off. Only a replay refuses this. If a port is
+        ``off``: whether ``action`` switches a device off, which only a replay refuses. If a port is
         closed, the warning says that the device may still be on.
         """
 

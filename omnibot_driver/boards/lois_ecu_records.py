@@ -80,9 +80,10 @@ def file_name(kind: RecordKind, at_s: float) -> str:
 
 
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
-    """Write the record to ``path``; return whether the file exists afterwards. Raises OSError.
+    """Write the record to ``path``; return whether ``path`` was written. Raises OSError.
 
-    ``wanted``: called after writing; if it returns False, the written data are discarded.
+    ``wanted``: called before the file at ``path`` is replaced; if it returns False, that file
+    stays.
     """
     rows = table(reading)
     return write_whole(

@@ -72,10 +72,10 @@ class ReadingClock(Protocol):
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
+        """Return one stamp for each of ``readings``, which one call of the board returned.
 
-        * ``now``: time that was passed to that call.
-        * ``edge``: value of ``Board.edge`` after that call.
+        * ``now``: time that was passed to this call of ``Board.receive`` or ``Board.elapse``.
+        * ``edge``: value of ``Board.edge`` after this call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:

@@ -173,7 +173,7 @@ class CommandPipeline:
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Tell the motion monitor the last sent set-point; None during a drive to a goal."""
+        """Tell the motion monitor the last set-point; during a drive to a goal, tell it None."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -269,7 +269,7 @@ class CommandPipeline:
         ]
 
     def end_goal(self, now: float) -> list[str]:
-        """Drop the goal or the docking after a refused zero ``cmd_vel``; return notices.
+        """Drop the goal or the docking for a zero ``cmd_vel`` that was refused; return notices.
 
         The goal stays if the board's control switch is set to position control, because ``cmd_vel``
         then has no effect.

@@ -143,7 +143,8 @@ class SteadySetpoint:
 class GoalSetpoint:
     """A pose to drive to.
 
-    * ``goal``, ``place``: this pose, in the odometry frame and in the board's earth frame.
+    * ``goal``: this pose in the odometry frame.
+    * ``place``: this pose in the board's earth frame.
     * ``alignment``: ``Odometry.alignments`` at the time of the command; a change discards the goal.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.

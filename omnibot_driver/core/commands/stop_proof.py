@@ -29,10 +29,9 @@ AT_LEAST: Final = 2
 A single displacement could be damaged, or come from the time before the wheels began to turn.
 """
 PROOFS: Final = 2.0
-"""Factor for the shortest time after which the driver stops waiting for a proof of a stop.
+"""Time limit for a proof of a stop, as a multiple of the standstill that is the proof.
 
-The factor multiplies the duration of the standstill that proves a stop. If displacements are rare,
-the driver waits longer.
+If displacements are rare, the driver waits longer.
 """
 RAREST_S: Final = 1.0
 """Upper limit, in s, for the assumed period of displacements.

@@ -20,10 +20,10 @@ MOST_OWED: Final = 0.5
 """Largest rounding error, in degrees, that is carried over to the next angle."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit, in degrees, for the false angle to the left that results from a lost minus sign.
+"""Limit, in degrees, for a wrong angle to the left.
 
-Angles to the right have a minus sign. The checksum does not detect that ``-`` and ``6`` are both
-lost.
+The board reads a wrong angle if an angle to the right loses the characters ``-`` and ``6``. The
+checksum does not detect this loss.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

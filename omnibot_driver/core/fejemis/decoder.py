@@ -17,9 +17,10 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""Number of heartbeats in a row that must contradict ``sums`` before the decoder changes ``sums``.
+"""Number of contradicting heartbeats in a row after which the decoder changes ``sums``.
 
-While ``sums`` is unknown, one heartbeat decides.
+``sums`` says whether the board's lines have checksums. While ``sums`` is unknown, one heartbeat
+decides.
 """
 
 

@@ -132,8 +132,8 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        Otherwise, a message that shows a restart of the board deletes times that the caller needs
-        for earlier messages.
+        A message that shows a restart of the board resets the clock with which the caller dates
+        earlier messages.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

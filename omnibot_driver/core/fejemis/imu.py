@@ -76,8 +76,8 @@ class ImuSamples:
     ) -> float:
         """Return when the board took the next sample. All times are in s of the board's clock.
 
-        * ``not_before_s``, ``next_pose_s``: times of the poses before and after the sample;
-          infinity if the next pose has not arrived.
+        * ``not_before_s``: time of the pose before the sample.
+        * ``next_pose_s``: time of the pose after the sample; infinity if this pose has not arrived.
         * ``skipped``: number of incomplete samples since the previous sample.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
@@ -112,7 +112,7 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Update the phase of the sampling times: as late as recent arrivals permit.
+        """Update the phase of the sampling times: no recent sample may arrive before its time.
 
         ``delay_s``: time in s from the sampling to the arrival of the new sample, by the old phase.
         """

@@ -30,7 +30,8 @@ From this limit on, the pair is used only if the next pose shows that no lines a
 SILENT_S: Final = 0.1
 """Limit, in s, for a time without gyro and acceleration lines.
 
-After a longer time, new pairs wait for the next pose, which shows whether lines are missing.
+After a longer time, pairs of these lines wait for the next pose, which shows whether lines are
+missing.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver in which new pairs of lines wait for the next pose.
@@ -45,8 +46,10 @@ From a magnitude of ``KNOWN_S`` on, the sign of the evidence decides. The magnit
 ``SUREST_S``.
 """
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to the interval between a gyro and an acceleration line with another
-line between them. These two lines probably belong to different samples.
+"""Time in s that is added to a pause between a gyro and an acceleration line.
+
+The driver adds this time if another line came in this pause, because the two lines then probably
+belong to different samples.
 """
 PATIENCE: Final = 60
 """Number of measured intervals after which the driver decides which line of a sample comes first.
@@ -59,7 +62,8 @@ MOST: Final = 10
 UNPOSED: Final = 20
 """Limit for the number of gyro lines, and of acceleration lines, since the last pose.
 
-Above this limit, the driver rejects a doubtful pair instead of waiting for the next pose.
+Above this limit, the driver rejects a doubtful pair of these lines instead of waiting for the next
+pose.
 """
 
 

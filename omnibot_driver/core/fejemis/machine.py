@@ -29,7 +29,7 @@ LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
 """Smallest voltage that is sent to the lift, as a fraction of the commanded voltage.
 
-The driver sends a lower voltage if the checksum cannot detect all damage to the number.
+The driver sends a lower voltage if the checksum cannot detect all damage to the commanded number.
 """
 LEAST_TIME_S: Final = 0.04
 

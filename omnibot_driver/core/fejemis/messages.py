@@ -154,10 +154,9 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: the track, and the distance from the axle to the steered wheel, in m.
+    """Line ``confs``: the track, and the distance from the axle to the steered wheel, in m.
 
-    * ``first_m``, ``second_m``: the numbers in the line's order; on some boards, the track is
-      first.
+    * ``first_m``, ``second_m``: these two lengths in the line's order, which depends on the board.
     * ``digits``: for each number, the value of one step of its last digit; empty if unknown.
     """
 

@@ -18,9 +18,9 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Limit for the speed in a curve, in m/s. Below this limit, the front board gets the speed 0.
+"""Speed in a curve, in m/s, below which the front board gets the speed 0.
 
-The texts of nearly all smaller speeds can become harmful if the line is damaged.
+Damage to the line could turn nearly every smaller number into a harmful one.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
@@ -76,8 +76,8 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line for a speed in m/s and a turn rate in rad/s.
 
-    The board ignores the units: the outer wheel runs at sqrt(``speed_mps``² + ``turn_radps``²)
-    in m/s, with the sign of ``speed_mps``.
+    The outer wheel runs at sqrt(``speed_mps``² + ``turn_radps``²) in m/s, with the sign of
+    ``speed_mps``. The board ignores the units.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:

@@ -2,9 +2,9 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-A checksum does not detect the loss of two characters whose codes add up to 99: ``1`` and ``2``,
-``0`` and ``3``, ``.`` and ``5``, ``-`` and ``6``. So no safe line contains such a pair. Motion
-lines begin with ``rc 2``, so their numbers contain no ``1``.
+No safe line contains two characters whose codes add up to 99, because a checksum does not detect
+the loss of both: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, ``-`` and ``6``. Motion lines
+begin with ``rc 2``, so their numbers contain no ``1``.
 """
 
 from bisect import bisect_left, bisect_right

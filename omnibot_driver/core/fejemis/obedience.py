@@ -69,8 +69,8 @@ class Obedience:
     def release(self, now: float) -> None:
         """Release the driver's e-stop.
 
-        If the drive board obeyed motion commands before the e-stop, and the user has not requested
-        a pause, ``start`` becomes due.
+        The driver must then send ``start`` if the drive board obeyed motion commands before the
+        e-stop, and the user has not requested a pause.
         """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf

@@ -14,13 +14,14 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between a new pose and the wheels' motion that the driver corrects.
+"""Fraction by which the driver corrects the wheels' motion towards a new pose.
 
 The fraction applies if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
-"""Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
-in units of the poses' last digit. The errors along both axes add up.
+"""Limit for the rounding error of a pose, along both axes together, in units of the last digit.
+
+Rounding cannot explain a larger difference between the pose and the wheels' motion.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
@@ -47,7 +48,8 @@ Each of these poses must agree with the rejected pose just before it.
 MOVED_FRAME: Final = 2
 """Number of rejected poses in a row that prove a new coordinate frame if the wheel speeds agree.
 
-The wheel speeds must agree with the motion to each of these poses from the rejected pose before.
+For each of these poses, the motion since the previous rejected pose must agree with the wheel
+speeds.
 """
 AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012

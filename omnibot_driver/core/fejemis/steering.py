@@ -32,7 +32,7 @@ class Steered:
     """A command for both boards, and the resulting motion of the body.
 
     * ``speed_mps``, ``turn_radps``: speed and turn rate for the front board.
-    * ``part``: factor, 0..1, for the drive board's speed and turn rate.
+    * ``part``: factor, 0..1, by which the drive board gets a lower speed and turn rate.
     * ``angle_rad``: the angle that the front wheel must reach.
     * ``twist``: the body's motion at the front wheel's current angle.
     """

@@ -30,7 +30,7 @@ class Coasting:
     speed_mps: float
 
     def unsure_mps(self, now: float, step_s: float) -> float:
-        """Return the speed's standard deviation at ``now``, in m/s; negative for a negative speed.
+        """Return the standard deviation of the speed at ``now``, in m/s, with the speed's sign.
 
         ``step_s``: period of the speed controller in s, by which the deceleration may be delayed.
         """

@@ -49,8 +49,9 @@ UNFORESEEN_TICKS: Final = 1.5
 that the wheel's speed has changed. The filter then allows for larger changes of the speed.
 """
 UNFORESEEN: Final = 5.0
-"""Difference, in standard deviations, between a reported and an expected count, that the motion of
-a wheel cannot explain. Such a difference may be a sign of a restart of the board.
+"""Limit for the difference between a reported and an expected count, in standard deviations.
+
+The motion of a wheel cannot explain a larger difference, but a restart of the board can.
 """
 SAME_TICKS: Final = 0.6
 """An unchanged count corrects the filter only if the expected count differs from it by at least
@@ -58,10 +59,10 @@ this number of ticks. Otherwise, the next tick may not be due yet.
 """
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP`` (standard deviations), ``LEAP_M`` (m): limits for deviations of the board's odometry.
+"""Limits for deviations of the board's odometry: ``LEAP`` in standard deviations, ``LEAP_M`` in m.
 
-A distance is ignored above ``LEAP``. A heading is ignored above both limits; in m, a heading is the
-difference of the two wheels' distances.
+A distance is ignored if its deviation exceeds ``LEAP``. A turn, as the difference of the wheels'
+distances, is ignored if its deviation exceeds both limits.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -72,18 +73,20 @@ SWINGING_M: Final = 0.055
 SWERVED_M: Final = 0.05
 """Standard deviation, in m, of the errors of the robot's x and y after a wheel has rolled 1 m.
 
-These errors occur only at an oscillating speed, and without counted ticks.
+Only for a wheel without counted ticks, at an oscillating speed.
 """
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviation of a distance rolled while reports were lost, as a fraction of this distance.
+"""Standard deviations of a distance rolled while reports were lost, as fractions of this distance.
 
-The values are for a wheel without counted ticks, at a steady and at an oscillating speed.
+The first is for a steady speed, the second for an oscillating one. Only for a wheel without counted
+ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""Standard deviation of a wheel's distance, as a fraction of its correction beyond a limit.
+"""Standard deviation of a wheel's distance after a large correction, as a fraction of the excess.
 
-The limit is ``CORRECTED_TICKS`` (in ticks). Only wheels without counted ticks have this error.
+The excess is the part of the correction above ``CORRECTED_TICKS`` (in ticks). Only for a wheel
+without counted ticks.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance
@@ -235,10 +238,9 @@ class Comparison:
             self._take_equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Record that a wheel is at rest, and correct the estimate of the wheel's distance.
+        """Record that a wheel is at rest, and subtract the distance that was added wrongly.
 
-        The driver subtracts the distance since the wheel's last certain motion. ``index``: 0 left,
-        1 right.
+        ``index``: 0 left, 1 right.
         """
         self._speeds[index].come_to_rest()
 

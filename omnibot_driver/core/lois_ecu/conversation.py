@@ -99,7 +99,8 @@ class LoisConversation:
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
         """Return the readings that ``data`` completes.
 
-        The caller must also call this method with b"" at the time ``held_until``.
+        At the time ``held_until``, the caller must call this method with b"" to get held-back
+        reports.
         """
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
@@ -190,8 +191,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop; None if tick reports do not show this.
 
-        Old reports show nothing. Nor do reports of the public firmware after RPM 0/0 or a backward
-        command.
+        None: the reports are old, or the board does not count ticks. The public firmware does not
+        count after RPM 0/0 or a backward command.
         """
         points, translation = self._points, self._translation
         if points.stood:

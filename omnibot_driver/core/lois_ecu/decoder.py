@@ -18,8 +18,10 @@ LONGEST_LINE: Final = 256
 """Largest accepted length of a line in bytes. Lines of the board's sensors, such as the GPS, are
 shorter than this."""
 SURE_AFTER: Final = 8
-"""Number of lines without a checksum that are discarded after each line with a checksum. After
-these, lines without a checksum are accepted again."""
+"""Number of lines without a checksum that the decoder discards after a line with a checksum.
+
+The decoder then accepts lines without a checksum again.
+"""
 
 
 @dataclass(slots=True)

@@ -10,10 +10,9 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Increase of the largest accepted heading error, as a fraction of the robot's turn.
+"""Limit for a heading error: ``NEAR_DEG`` (in degrees) plus ``NEAR_PART`` times the robot's turn.
 
-The turn is measured since the heading with which the new one is compared. ``NEAR_DEG``: the limit
-without a turn, in degrees.
+The turn is measured since the heading with which the new heading is compared.
 """
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0

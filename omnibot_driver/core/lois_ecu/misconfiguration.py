@@ -59,8 +59,8 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
-    Call ``look`` with all received bytes. After a read with reports, call ``understood()`` and
-    ``heard``.
+    Call ``look`` with all received bytes. After a read with reports, call ``understood()`` to clear
+    the advice, and ``heard`` to check for ticks.
 
     * ``advice``: what the user should check, or None.
     * ``no_ticks``: whether the board sends reports, but no ticks.

@@ -49,7 +49,8 @@ may be due each time that a setting could be sent."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
 """Delays in s, used in turn, from a report to a round of settings or to a request of a GPS date.
 
-The board cannot receive while it sends: after a constant delay, every line could be lost.
+The board cannot receive while it sends. After a constant delay, the board could be
+sending every time.
 """
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
@@ -57,8 +58,10 @@ fraction of the set period. Within it, the set period is confirmed."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two calls of ``ask_date`` that request the GPS date."""
 TICKS_DUE_S: Final = 1.5
-"""Longest wait for a tick report, in s since the last one. After the driver has written a long
-period of the tick reports, it writes the period again only after a tick report or this wait."""
+"""Longest wait for a tick report, in s since the last one, before the driver sets its period again.
+
+Only for a period above ``FAST_TICKS_MS``.
+"""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's normal mode. The time is
@@ -71,8 +74,8 @@ The board may send other reports, but too few tick reports to start further sett
 RESYNC: Final = b"::"
 """Two extra colons between a line with a checksum and a line without.
 
-If the board expects no checksums, the colons prevent that two lost characters turn the lines into a
-motion command.
+If the board expects no checksums, these two lines could otherwise become a motion command by the
+loss of two characters.
 """
 
 

@@ -119,7 +119,10 @@ class TicksGate(Gate[Ticks]):
         self._steps = 0
 
     def passes(self, group: Ticks, now: float) -> bool:
-        """Return whether to accept these ticks. Store them, and infer the unit of the clock."""
+        """Return whether to accept these ticks.
+
+        Store them, and infer the unit of the board's clock.
+        """
         last = self._last
         passed = super().passes(group, now)
         if passed:

@@ -48,7 +48,7 @@ class RepeatedReset:
 
     @property
     def pending(self) -> bool:
-        """Whether a reset was begun, and is neither shown by the tick counts nor given up."""
+        """Whether the driver still waits for tick counts that prove a reset."""
         return self._proof is not None and not self._shown
 
     def begin(self) -> bytes:

@@ -50,8 +50,10 @@ SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a speed controller (``wound_m``) while the wheel does not tick, as a
-fraction of ``WINDUP_M``. If the integral reached ``WINDUP_M``, the wheel would start to move."""
+"""Largest assumed value of ``wound_m`` while a wheel does not tick, as a fraction of ``WINDUP_M``.
+
+``wound_m`` is the integral of the speed controller. At ``WINDUP_M``, the wheel would start to move.
+"""
 
 
 class ReportedSpeed:
@@ -183,9 +185,9 @@ class ReportedSpeed:
         return motion.tuned and wheel.steady and strays
 
     def _starts_too_fast(self, told_rpm: float) -> bool:
-        """Return whether the first speed of a wheel that starts is implausible.
+        """Return whether the first reported speed of a starting wheel is implausible.
 
-        The board's timer wraps every 6.6 s, so the speed may have any value after a long rest.
+        The board's timer wraps every 6.6 s, so the board may report any speed after a long rest.
         """
         motion, wheel = self._motion, self._wheel
         if self._told or wheel.rolls_on or wheel.course.kind != "rpm":

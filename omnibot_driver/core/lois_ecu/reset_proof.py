@@ -55,8 +55,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the reset as done.
 
-        This is so if the counts ``ticks`` are near zero, and prove the reset. From ``UNPROVED_S``
-        after the first call, counts near zero are enough.
+        The counts ``ticks`` must be near zero. Until ``UNPROVED_S`` after the first call, the
+        counts must also prove the reset.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

@@ -25,11 +25,16 @@ LOST_S: Final = 0.25
 """Limit for the mean time in s between the last ``LOST_REPORTS`` reports. If the mean time is above
 the limit, reports are lost, or the board rarely sends reports."""
 REPORT_S: Final = 0.2
-"""Longest usual time in s between two reports. While reports are lost, each report ages the stored
-speeds by at most ``REPORT_S``, so that they are not forgotten too soon."""
+"""Longest usual time in s between two reports.
+
+After lost reports, the next report makes the stored speeds older by at most ``REPORT_S``, so that
+the driver does not forget them too soon.
+"""
 HIDDEN_PART: Final = 0.3
-"""Rate at which the stored speeds age while the board does not report the wheel's speed, as a
-fraction of real time. Slower ageing keeps the speeds for longer."""
+"""Part of a time without reported speeds that is added to the age of the stored speeds.
+
+The driver thus keeps the stored speeds for longer.
+"""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -113,9 +118,9 @@ class RestingWheel:
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
-        """Return the probabilities that the wheel is at rest; empty if the wheel surely rolls.
+        """Return probabilities that the wheel is at rest, by the number of repeats of its speed.
 
-        The index is the number of times that the last reported speed has been repeated.
+        The result is empty if the wheel surely rolls.
         """
         # A wheel at such a speed rolls on, unless a late tick has made the speed wrong.
         if rpm >= FASTEST_RPM:

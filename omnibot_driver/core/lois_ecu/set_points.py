@@ -31,7 +31,7 @@ class SetPoints:
 
     * ``saturated``: number of commands that were slowed, because a value was above its limit.
     * ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
-      none was sent. The method ``clears`` changes this time to plan the next RPM 0/0.
+      none was sent. Each RPM 0/0 (``clears``) moves this time forward.
     * ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
     * ``moved_at_s``: time of the last motion command.
     * ``said_at_s``: time of the last set-point, also of a zero one.
@@ -97,7 +97,7 @@ class SetPoints:
         return max(CLEAR_AFTER_S, CLEAR_AFTER_TICKS * ticks_ms / 1000)
 
     def clears(self, now: float) -> bool:
-        """Return whether to send RPM 0/0 now. If so, also plan when RPM 0/0 is repeated."""
+        """Return whether to send RPM 0/0 now, after a Stop. If so, also plan its repetition."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - self._clear_after_s + CLEAR_AGAIN_S

@@ -23,8 +23,11 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 ROUNDS: Final = 5
 FAST_TICKS_MS: Final = 200
-"""Longest period of the tick reports, in ms, that each of the first ``ROUNDS`` settings rounds
-writes. Fewer rounds write a longer period, because each write restarts the period on the board."""
+"""Limit for the period of the tick reports, in ms.
+
+Each write delays the next tick report, so only some of the first ``ROUNDS`` settings rounds write a
+longer period.
+"""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the setting LEFT_SHORT_CORRECTION in the public firmware after a boot."""
 
@@ -32,7 +35,7 @@ BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 def slow_ticks(settings: LoisEcuSettings) -> bool:
     """Return whether the period of the tick reports is longer than ``FAST_TICKS_MS``.
 
-    Not every settings round writes such a period, because each write delays the next tick report.
+    Only some settings rounds write such a period, because each write delays the next tick report.
     """
     return settings.periods_ms.get(Stream.TICKS, 0) > FAST_TICKS_MS
 

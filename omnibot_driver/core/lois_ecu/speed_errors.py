@@ -48,8 +48,8 @@ class SpeedErrors:
     def restored(self) -> None:
         """Record that the filter has gone back to an earlier state.
 
-        If a wheel follows a duty command, the next ``follow`` resets the errors of both wheels. The
-        errors in the earlier state may be those of RPM set-points.
+        If a wheel follows a duty command, the next ``follow`` resets the errors of both wheels,
+        which may come from earlier RPM set-points.
         """
         if self._kinds and "duty" in self._kinds:
             self._kinds = None

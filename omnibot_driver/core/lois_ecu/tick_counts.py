@@ -40,8 +40,10 @@ CONTRADICTED_S: Final = 1.0
 """Longest time in s for which wheels are assumed to have rolled back before a tick report that
 contradicts the known unit of the board's clock."""
 IN_FLIGHT_S: Final = 0.5
-"""Time in s for which received counts may still be from before a reset. The time begins with the
-first counts that arrive after the driver has sent the reset."""
+"""Time in s for which received counts may be older than a reset.
+
+The time begins with the first counts that arrive after the driver has sent the reset.
+"""
 
 
 class TickCounts:

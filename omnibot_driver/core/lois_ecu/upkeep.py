@@ -44,8 +44,11 @@ class Upkeep:
     def configure(self, settings: LoisEcuSettings) -> None:
         """Use new settings, and write changed ones to the board.
 
-        The robot is first stopped for a new drive mode or a sensor's terminal mode; in duty mode,
-        also for a new duty scale or a lower ``max_duty``.
+        The robot is stopped before these changes:
+
+        * a new drive mode;
+        * the terminal mode of a sensor;
+        * in duty mode, a new duty scale or a lower ``max_duty``.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:

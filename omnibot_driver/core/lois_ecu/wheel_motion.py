@@ -46,8 +46,11 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Standard deviation of the distance of a wheel that halts soon after a new set-point, in m per m/s
-of ``unsettled_mps``. The first value is for the board's gains, the second for the user's."""
+"""Standard deviation of the distance of a wheel that halts soon after a new set-point.
+
+The unit is m per m/s of the speed error at this set-point (``unsettled_mps``). The first value is
+for the board's gains, the second for the user's.
+"""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -107,7 +110,7 @@ class Wheel:
         self.cut = False
         """Whether the wheel still has no power after a reset of its speed controller.
 
-        The wheel gets power again when the controller's integral, ``wound_m``, is large enough.
+        The wheel gets power again when ``wound_m``, the controller's integral, is large enough.
         """
         self.rolls_on = False
         """Whether the reported speed may still belong to the motion before the last reset of the
@@ -121,8 +124,10 @@ class Wheel:
         m/s.
         """
         self.locked = False
-        """Whether the wheel is at rest, and cannot start because its controller gives no power. The
-        controller still uses the last speed from before the standstill, which exceeds the target.
+        """Whether the wheel is at rest, and cannot start because its controller gives no power.
+
+        The controller still uses the last speed before the standstill, and this speed exceeds the
+        target.
         """
         self.rests = False
         """Whether the driver has concluded that the wheel is at rest.
@@ -154,7 +159,7 @@ class Wheel:
         """Return the factor by which motion of the wheel changes the tick count: 1, -1 or 0.
 
         0: the board does not count. ``signed``: whether the count decreases when the wheel rolls
-        backward. The factor is then 1.
+        backward. If True, the factor is always 1.
         """
         if signed:
             return 1.0

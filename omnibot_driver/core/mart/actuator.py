@@ -17,7 +17,7 @@ from omnibot_driver.core.mart.required_motion import SLOWEST_MPS, SLOWEST_RADPS
 from omnibot_driver.core.packets import Packets
 
 FARTHEST_M: Final = 1000.0
-"""Largest distance to a goal, in m. The server might misread a distance with more digits."""
+"""Largest distance to a goal, in m. The server might misread the digits of a larger distance."""
 
 
 class Conductor:

@@ -126,8 +126,7 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that follow from a datagram of this channel.
 
-        Once the mode is nominal, each reply gives at least one reading: ANSWERED if there is no
-        other reading.
+        Once the mode is nominal, a reply that gives no other reading gives ANSWERED.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
@@ -153,10 +152,10 @@ class MartBoard(Board):
         return self._pilot.take()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that are due even if no datagram arrives.
+        """Return the readings that are due without a datagram, such as odometry or a job's result.
 
-        Examples are odometry, and the result of a job. While a busy server is expected to be
-        silent, NOTHING_MEASURED every ``EXPECTED_EVERY_S`` makes the driver regard it as alive.
+        While the server is busy, NOTHING_MEASURED comes every ``EXPECTED_EVERY_S``, so that the
+        driver does not regard the silent server as lost.
         """
         readings = self._pilot.take()
         pilot = self._pilot
@@ -238,7 +237,7 @@ class MartBoard(Board):
     def is_fresh(self) -> bool:
         """Whether the server's heading is known and exactly zero, as before its first RM.
 
-        Otherwise, the driver must not set back the server's clock: each forward drive (RM)
+        Otherwise, the server's clock must not be set back, because each RM (forward drive)
         integrates the turn rate over the time since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero

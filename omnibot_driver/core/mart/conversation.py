@@ -39,7 +39,7 @@ LOSS, LOSS_S = 1.5, 0.02
 The new value is ``LOSS * trip_s + LOSS_S`` (s), at most ``delay_s``.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""Limits in s for a disturbed network, in which a reply may answer an earlier query.
+"""Times in s for a disturbed network, in which a reply may answer an earlier query.
 
 * ``SLOW_S``: an urgent query (PRESSING) that takes longer is a sign of a disturbance.
 * ``DISTURBED_S``: duration of the disturbance after the last sign.

@@ -23,9 +23,10 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Standard deviations of the estimated first run of a controlled move that the robot made twice.
+"""Standard deviations of the assumed distance or turn in the first run of a move that ran twice.
 
-``RUN``: relative part of the error. ``END_RUN_M``, ``END_RUN_RAD``: constant part, in m and in rad.
+``RUN``: as a fraction of this distance or turn. ``END_RUN_M``, ``END_RUN_RAD``: constant part, in m
+and in rad.
 """
 
 

@@ -42,9 +42,11 @@ as a fraction of the track width. A turn of less than 1 rad has a proportionally
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Random error of a turn that is computed from the commands, as a fraction of its systematic error.
-Both are standard deviations. The random error is independent in each interval between encoder
-counts."""
+"""Random error of a turn computed from commands, as a fraction of the turn's systematic error.
+
+Both errors are standard deviations. The random error is independent in each interval between
+encoder counts.
+"""
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
 
@@ -139,7 +141,7 @@ class Doubt:
         self._walk = self._walk.with_errors(_around(m2, rad2))
 
     def end(self) -> None:
-        """Add the errors that the start and the coasting of the motion have caused."""
+        """Add the pose errors from the start and the coasting of a motion that has ended."""
         self.add(END_M**2, END_RAD**2)
 
     def end_straight(self) -> None:

@@ -81,10 +81,10 @@ class FailedStarts(Adjusting):
         )
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
+        """Return whether an earlier motion may be the cause of the failure of RM (forward drive).
 
-        The result is False for an obstacle that the front sonar confirms, or that RM reports twice
-        in a row.
+        If RM reports an obstacle, the result is False if the front sonar confirms the obstacle, or
+        if it is the second such report in a row.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

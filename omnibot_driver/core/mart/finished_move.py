@@ -22,8 +22,7 @@ The word SLOW in a request doubles the times per degree and inch; ``Done.slownes
 the robot.
 """
 LEAST_PACE: Final = 0.65
-"""Lowest plausible mean speed in one run of a move, as a fraction of the usual speed in this move.
-"""
+"""Lowest plausible mean speed of an incomplete move, as a fraction of the move's usual speed."""
 FULL, TWO = 0.6, 1.25
 """``FULL``: shortest duration of one complete run of a move. ``TWO``: shortest duration of two
 complete runs. Both are fractions of the move's usual duration."""

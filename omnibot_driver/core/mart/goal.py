@@ -33,8 +33,8 @@ For example, the robot drives 15.8 inches instead of 12.
 DOCK_STRETCH: Final = 1.6
 """Assumed largest ratio of driven to requested length of a docking move.
 
-The driver requests the allowed length divided by this ratio, so that the robot does not drive too
-far.
+The driver requests ``dock_distance`` divided by this ratio, so that the robot does not drive
+farther.
 """
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
@@ -147,10 +147,9 @@ class Move:
         return Move(self.place, said=ENOUGH_MOVES, turns=self.turns)
 
     def cut(self) -> None:
-        """Count moves and turns from 0 again, because a straight move took too long.
+        """Count moves and turns from 0 again: the driver ended a straight move that took too long.
 
-        The driver has stopped this move, but the goal has not failed: a goal that is far away needs
-        several straight moves.
+        The goal has not failed, because a goal that is far away needs several straight moves.
         """
         self.said = self.turns = 0
 

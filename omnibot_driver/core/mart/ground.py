@@ -64,8 +64,8 @@ ABSENT_TRIPS times the average duration of a query is added to this time.
 GAP_S, GAP_LONGEST_S = 0.12, 1.0
 """Times in s to detect a restart of the server by a short silence while the robot is at rest.
 
-* ``GAP_S``: silence after which the driver reads the heading. Twice the average duration of a query
-  is added. A heading of exactly zero shows a restart.
+* ``GAP_S``: silence, plus twice the average duration of a query, after which the driver reads the
+  heading. A heading of exactly zero shows a restart.
 * ``GAP_LONGEST_S``: longest wait for this heading, from the end of the silence.
 """
 ABSENT_BUSY_S: Final = 2.5
@@ -225,8 +225,8 @@ class Ground:
     def _hears(self, now: float) -> None:
         """Record the arrival of a reply, and decide whether the server may have been restarted.
 
-        A restart is possible after a long silence, and after a HELLO that a server of another kind
-        has answered.
+        A restart is possible after a long silence, or if the server that last answered HELLO was
+        not a motion controller.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:

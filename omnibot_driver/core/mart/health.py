@@ -148,8 +148,8 @@ class Health:
     def outlives(self) -> None:
         """Record that the server's stop port may still wait for the end of an old motion.
 
-        The stop port was used to end this motion. The server's answer to a stop command now shows
-        that no restart has freed the port.
+        Call this method when the server answers a stop: the answer shows that the server was not
+        restarted.
         """
         self.outlived, self._may_be_restarted = True, False
 

@@ -19,8 +19,10 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units that needs no answer while the driver computes the
-robot's turn from the units. After a larger change without an answer, the driver stops the robot."""
+"""Limit for a relative change of the motors' units that the server does not answer.
+
+Above the limit, the driver stops the robot if the robot's turn is computed from the units.
+"""
 
 
 class Hearing(Measuring):

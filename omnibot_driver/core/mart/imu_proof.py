@@ -91,7 +91,7 @@ class ImuProof:
         )
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check; return False if the caller must evaluate it.
+        """Evaluate the reply to a check; return False for a reply that is not evaluated here.
 
         This method evaluates successes, a dead IMU, and a server that does not know RST IMU.
         ``took_s``: time in s from check to reply.

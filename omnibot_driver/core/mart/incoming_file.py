@@ -47,10 +47,9 @@ class IncomingFile:
 
     @property
     def order_is_sure(self) -> bool:
-        """Whether the lengths of the pieces show their order.
+        """Whether the lengths of the pieces show their order: at most one piece is full.
 
-        A full piece and the shorter last piece differ in length, but two full pieces do not. So at
-        most one piece may be full.
+        A full piece and the shorter last piece differ in length, but two full pieces do not.
         """
         return len(self._full) <= 1
 
