@@ -128,9 +128,9 @@ def test_a_late_velocity_and_nan_do_not_end_a_goal(
 
 
 def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A late zero command is refused, and the velocity command of cmd_vel stays in effect.
+    """A zero that arrives late on cmd_vel is refused. The velocity from cmd_vel stays in effect.
 
-    The velocity command may be newer than the zero.
+    This velocity may be newer than the zero.
     """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)

@@ -298,8 +298,8 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 ) -> None:
     """The driver rejects a speed limit that is above the fastest possible speed.
 
-    Otherwise, the odometry would reject every displacement of a robot that drives faster than this
-    speed, without a message.
+    Above the fastest possible speed, the odometry would reject every displacement without a
+    message.
     """
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest

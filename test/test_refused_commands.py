@@ -100,9 +100,9 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a stop by the motion monitor, the sender has paused, so motion is no longer refused.
+    """After a stop by the motion monitor, the sender pauses, which ends the refusal of motion.
 
-    A command arrives too late and is refused, but the next command is accepted.
+    Then a late command is refused, but the next command is accepted.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

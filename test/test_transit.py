@@ -225,9 +225,9 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
 def test_late_commands_of_two_senders_are_refused_after_one_of_them_was_silent(
     silent_s: float, drift: float, late_s: float
 ) -> None:
-    """Late commands of two senders on one host are refused, although one sender was silent before.
+    """One of two senders on a host is silent while the host's clock drifts.
 
-    During this silence, the host's clock drifts. After it, each sender sends a late command.
+    After the silence, each sender sends a late command. The driver refuses these commands.
     """
     receiver, silent, busy = Receiver(), Sender(), Sender(sent=1000)
     receiver.hear(busy, 99.0, 0.01)
@@ -282,10 +282,10 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """A sender's first message takes 0.5 s. The offset of the sender's clock is unknown.
+    """A new sender's first message takes 0.5 s. The driver assumes that this message took no time.
 
-    For the second message, the driver returns two sending times. The estimate by the driver's clock
-    is 0.5 s too late. The time by the sender's clock is right.
+    So the driver's estimate of the next sending time is 0.5 s too late. The driver also returns the
+    time by the sender's clock, which is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)

@@ -128,7 +128,10 @@ class Bench:
             self.run(TICK_S)
 
     def configure(self, **changed: Any) -> None:
-        """Change these fields of SessionSettings. All other fields get their initial values."""
+        """Change these fields of SessionSettings.
+
+        All other fields get their values from ``self.settings``.
+        """
         self.session.configure(replace(self.settings, **changed), self.now)
         self.settle()
 

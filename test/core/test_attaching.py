@@ -102,7 +102,7 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
     """The board was paused, so the duration of the first displacement is unknown.
 
-    The driver knows nevertheless where odom begins: the first estimate has a covariance of zero.
+    Nevertheless, the first odometry has a covariance of zero, because odom begins there.
     """
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
@@ -174,7 +174,7 @@ def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) ->
 
 
 def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
-    """Three damaged poses with three different headings do not confirm each other."""
+    """Damaged poses with different headings do not confirm each other."""
     odometry = Odometry(SETTINGS)
     attach(odometry, heading(0.0))
     for yaw in (1.0, 2.0, -1.0):
@@ -220,7 +220,7 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
     """The heading is known once two poses agree, and unknown after a gap of 20 displacements.
 
-    A heading of 0 that is only assumed counts as unknown.
+    Without any pose, the heading is unknown.
     """
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known

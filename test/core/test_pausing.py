@@ -81,10 +81,10 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board just before the user requests a pause.
+    """Another program pauses the board, and then the driver's P resumes the board.
 
-    The driver's P resumes the board. The late «Paused» text of the first pause does not confirm the
-    request, so the driver sends P again.
+    The late «Paused» text of the first pause does not confirm the user's request for a pause. So
+    the driver sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")

@@ -169,7 +169,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
     """The user resets a board that boots within 0.1 s.
 
-    The driver sends only one R, because the number in the second «Paused» text shows the restart.
+    The driver sends only one R, because n in the second text «Paused: n» shows the restart.
     """
     bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
     bench.open()
@@ -249,9 +249,9 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 @pytest.mark.slow
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """A pause and then a reset fail, because the board receives nothing.
+    """The board receives nothing, so a requested pause and then a requested reset fail.
 
-    The driver still wants the board to pause. When the board receives again, the driver pauses it.
+    When the board receives again, the driver pauses it, as the user has requested.
     """
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)

@@ -95,7 +95,7 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
 def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
     """One displacement is lost before a longer gap in which the board restarts.
 
-    The pose at the new origin shows the restart, so odom does not jump.
+    The next pose shows the board's new origin, so odom does not jump.
     """
     odometry, estimates = driven(75, 0.016)
     estimates += odometry.displace(replace(earth(0.016, 0.0), lost=1), 76 * PERIOD_S)
@@ -158,7 +158,7 @@ def test_a_disproved_restart_leaves_no_more_uncertainty_than_the_motion_that_was
 ) -> None:
     """A delta seems to show a restart, but the next poses show that the board has not restarted.
 
-    The covariance covers the unnoticed motion ``lost_m`` in any direction, and no error of the yaw.
+    The covariance covers the unnoticed motion ``lost_m`` in x and y. The yaw remains certain.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip(0.7)
     attach(odometry, trip.pose)

@@ -70,7 +70,7 @@ class Navigator:
         self._goals = probe.publisher(PoseStamped, "cmd_pose")
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
-        """Send a goal far away in the direction of this motion."""
+        """Send a goal far away in the direction of this velocity."""
         self._probe.wait_for(lambda: self._odom)
         here = self._odom[-1].pose.pose
         yaw = 2 * math.atan2(here.orientation.z, here.orientation.w) + yaw_rate

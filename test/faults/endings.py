@@ -116,9 +116,9 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Publish on the topic ``estop``. Its callback then ends the driver.
+    """End the driver by a message on the topic ``estop``.
 
-    The code in ``Ending.before`` has put this callback in the place of the usual one.
+    ``Ending.before`` has replaced the callback of this topic by one that ends the driver.
     """
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))

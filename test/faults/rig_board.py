@@ -18,7 +18,7 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the fault campaign.
 
-    ``ports``: returns the driver's port parameters for the name of the port.
+    ``ports``: takes the name of the port, and returns the driver's port parameters.
 
     ``old_command``: the bytes of a motion command, with which tests fill the port.
 
@@ -32,10 +32,9 @@ class RigBoard:
 
     ``old_bytes_s``: time that the board needs to receive all old commands from a full port.
 
-    ``ends_later_s``: time that is added to the usual limit for the driver's end.
+    ``ends_later_s``: extra time for the driver's end, beyond the usual limit.
 
-    ``rests_later_s``: time that is added to the limit for the robot to come to rest after several
-    simultaneous faults.
+    ``rests_later_s``: extra time for the robot to come to rest after several simultaneous faults.
 
     ``deaf_s``: longest time for which the board may ignore its input.
 

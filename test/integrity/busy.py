@@ -29,14 +29,14 @@ TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
 """How often and how long busy loops slow the process down.
 
-``BEHIND_SHARE``: share of the wake-ups with which such a slow period begins.
+``BEHIND_SHARE``: share of the wake-ups at which a slow period begins.
 
-``BEHIND_FOR_S``: the range of the duration of a slow period, in s.
+``BEHIND_FOR_S``: range of the duration of a slow period, in s.
 """
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """Ranges of the delay of a wake-up in a slowed process, in s.
 
-``SHARE_S`` is for a reader, and ``SLOW_S`` for an adapter.
+``SHARE_S``: range for a reader. ``SLOW_S``: range for an adapter.
 """
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)

@@ -22,8 +22,8 @@ class Understood:
 
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the next special write, or the number of writes. A
-    special write begins or ends a motion, waits for an earlier write, or is misunderstood.
+    ``alike_until``: for each write, the index after its series of like writes. A series ends before
+    a write that begins or ends a motion, waits for an earlier write, or is misunderstood.
     """
 
     held: list[bytes]

@@ -30,8 +30,10 @@ READ_S: Final = 0.002
 """Time from a tick until the driver reads its bytes, in s."""
 STANDS: Final = Shown("running", False)
 CLOCK_S: Final = 1e-6
-"""Shortest time in s until the session's next wake-up. With this limit, time advances even if the
-wake-up is already due."""
+"""Smallest step of the simulated time to a wake-up, in s.
+
+Time advances even if the wake-up is already due.
+"""
 History = tuple[tuple[int, Shown], ...]
 """The states that the board shows in a scene, each with the tick at which the state begins."""
 

@@ -26,7 +26,8 @@ class Line(Protocol):
     """The damaged line of one trial.
 
     ``whole``: number of bytes before the next fault. A write of at most ``whole`` bytes arrives
-    undamaged. The caller may subtract its length from ``whole`` instead of calling ``carry``.
+    undamaged. The caller may subtract the write's length from ``whole`` instead of calling
+    ``carry``.
     """
 
     whole: int

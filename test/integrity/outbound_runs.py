@@ -27,8 +27,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Minimum number of trials with a stop, for each receiver and rate of lost bytes.
 
-The scenes in ``ENDED`` share the trials equally. With 1 byte in 100 lost, each scene in
-``HURRIES``, for example "e-stop", has ``NEEDED`` trials.
+All scenes in ``ENDED`` together have this number of trials. With 1 byte in 100 lost, each scene in
+``HURRIES``, for example "e-stop", has this number alone.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"

@@ -52,7 +52,7 @@ class BoardKind:
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """A wrong motion or letter at the board in a trial, and the driver's last writes before it.
+    """An error in a trial, such as stray motion, and the driver's last writes before the error.
 
     ``writes``: for each write, its time in s, its bytes, and the bytes that reached the board.
     """
@@ -136,9 +136,9 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip the transmission of writes that arrive undamaged and change nothing.
+        """Skip a series of writes that arrive undamaged and change nothing.
 
-        The skipped writes count as arrived. The last write of such a series goes over the line as
+        The skipped writes count as arrived. The last write of the series goes over the line as
         usual.
         """
         course, receiver, begin = self._course, self._receiver, self._number

@@ -222,9 +222,9 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder finds what it knew after any earlier frame, by evaluating at most 6 frames again.
+    """``known_after`` returns the same context as an evaluation of all frames from the first one.
 
-    The result is the same as after an evaluation of all frames from the first one.
+    ``known_after`` evaluates at most 6 frames again.
     """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)

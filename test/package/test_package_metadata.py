@@ -217,7 +217,10 @@ def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
 
 
 def test_optional_packages_are_started_and_documented() -> None:
-    """rosdep does not install the optional packages. The README says how to install them."""
+    """Launch files start the optional packages, which rosdep does not install.
+
+    The README says how to install them.
+    """
     readme = (ROOT / "README.md").read_text()
     assert started_by(python_files("launch")) >= OPTIONAL
     for name in OPTIONAL:

@@ -95,7 +95,7 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 
 
 def test_the_boards_are_the_packages_beside_what_they_share() -> None:
-    """Each package in the folder of ``common`` is a board. The program needs no list of boards."""
+    """Each package beside ``common`` is a board. The program needs no list of boards."""
     folder = Path(simulators.__file__).parent
     packages = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert {*boards(), "common"} == packages

@@ -117,9 +117,9 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 
 
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
-    """The tool reports a robot that moves at less than a fifth of the commanded velocity.
+    """The tool raises an error if the robot moves at less than a fifth of the commanded velocity.
 
-    The tool also reports a measured velocity of NaN. Very slow commands are not checked.
+    A measured NaN is also an error. Very slow commands are not checked.
     """
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)

@@ -131,7 +131,7 @@ def test_a_computer_too_slow_for_the_imu_still_hears_the_estop(
 ) -> None:
     """IMU messages arrive faster than the tool reads them.
 
-    The tool still reads the other topics.
+    The tool still receives the e-stop.
     """
     estop = robot._node.create_publisher(Bool, "estop", 10)
     assert robot._wait(estop.get_subscription_count, PATIENCE_S)

@@ -122,7 +122,7 @@ def test_axes_that_disagree_are_told() -> None:
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """The tool reports an error if no speed is steady, or if a speed is opposite to its command."""
+    """The tool reports an error if no speed is steady or a measured speed has the wrong sign."""
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):

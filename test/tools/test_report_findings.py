@@ -291,9 +291,9 @@ def test_the_imu_of_another_robot_is_not_expected(
 
 
 def test_no_rate_of_an_omnibot_is_expected_of_two_wheels(drive: Drive) -> None:
-    """The report gives no verdict on the rate of odom if no rate is expected.
+    """The report gives no verdict on the rate of odom of a robot with two wheels.
 
-    The recording has no diagnostics, and the OmniBot's rate does not apply to two wheels.
+    The recording has no diagnostics, and the OmniBot's rate does not apply to this robot.
     """
     drive.statuses.clear()
     drive.joints.values = drive.joints.values[:, :2]

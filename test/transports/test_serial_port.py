@@ -110,7 +110,7 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
 ) -> None:
     """A port on a real terminal makes the terminal exclusive until the port is closed.
 
-    Only root can then open the terminal again, which keeps out programs without locks. A
+    Only root can then open the terminal, which also stops programs that ignore locks. A
     pseudo-terminal is not made exclusive.
     """
 

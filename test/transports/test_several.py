@@ -182,7 +182,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 ) -> None:
     """The driver does not share a line with the guard if the line accepts no more data.
 
-    The guard would keep the port locked, so the driver could not open the port again.
+    The driver must close and reopen this line, but the guard's copy would keep the port locked.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])

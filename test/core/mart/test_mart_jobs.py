@@ -100,9 +100,9 @@ def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
 
 @pytest.mark.parametrize("longest_m", [0.2, 0.5, 1.0, 3.0])
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
-    """Without a dock, the robot drives no farther than the permitted distance.
+    """Without a dock, the robot drives at most the permitted distance.
 
-    The server's moves go too far, so the driver requests less. Obstacles do not end a docking move.
+    The driver requests less than this distance, because the server's moves go too far.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))

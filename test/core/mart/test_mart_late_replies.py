@@ -105,10 +105,10 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 
 
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
-    """The network duplicates the server's replies "not supported".
+    """The network delivers each reply "not supported" twice.
 
-    The driver does not take a copy for the result of the next check of the IMU, and the robot
-    turns.
+    The driver does not take the copy for the result of the next check of the IMU, and obeys the
+    command to turn.
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)

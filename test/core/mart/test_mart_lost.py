@@ -91,8 +91,8 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
 ) -> None:
     """The driver starts while the robot moves with a dead IMU.
 
-    The driver's stops make both ports hang. After ``wait_s`` seconds, the IMU works again, and the
-    server answers. The driver refuses motion.
+    The driver's stops make both ports hang. After ``wait_s`` seconds, the IMU works again, but the
+    stop port still hangs. The driver refuses motion.
     """
     bench = MartBench("source", NetworkFaults(delay_s=delay_s))
     bench.server.receive(met, 0, None, 0.0)

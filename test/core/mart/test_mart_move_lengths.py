@@ -97,8 +97,8 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the_way() -> None:
     """The network delivers a move twice, and the driver stops the second run.
 
-    The odometry contains both runs, although the encoder shows only the second. The driver learns
-    no length from this move.
+    The odometry contains both runs. The driver does not use this move to learn the lengths of
+    moves.
     """
     bench = MartBench().ready()
     bench.go_to(0.8, 0.0, 0.0)

@@ -177,9 +177,9 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """If two motions end with the same encoder count, the covariance covers two cases.
+    """Two motions end with the same encoder count, which begins at zero in each motion.
 
-    Either the start of the second motion was lost, or the second motion was equal to the first.
+    The covariance covers a lost start of the second motion and a second motion equal to the first.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -242,9 +242,10 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
 
 
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
-    """After a reset of the odometry during a controlled move, the covariance covers the error.
+    """The odometry is reset during a controlled move.
 
-    The encoder count at the end of the move also contains the distance before the reset.
+    The encoder count of this move also contains the distance before the reset, so the odometry is
+    wrong. The covariance covers this error.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)

@@ -29,8 +29,8 @@ def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> N
     """A single fault in a trial with two user commands does no harm.
 
     * A datagram is lost, late or doubled: the server does not hang, and the robot rests.
-    * The IMU dies: no motion begins more than 0.25 s later, and the robot rests, or the driver
-      reports a lost server.
+    * The IMU dies: no motion begins more than 0.25 s later. The robot rests, or the driver reports
+      a lost server.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))

@@ -222,9 +222,9 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
 def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_queries(
     after_s: float, boot_s: float
 ) -> None:
-    """The server answers the first stop (SM) of a turn, and restarts.
+    """The server answers the first of two stops (SM) of a turn, and restarts.
 
-    The driver delays VOLTS (voltage query), which would crash a server that is starting up.
+    The driver delays VOLTS (voltage query), because VOLTS crashes a starting server.
     """
     bench = MartBench("source").ready()
     bench.command_until(0.0, 0.5, lambda: not bench.robot.stands, 8.0)

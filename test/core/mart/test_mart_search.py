@@ -142,10 +142,10 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """Return the state of the server, with fixed values for what the test cannot compare.
+    """Return the state of the server with only what the test can compare.
 
-    A waiting command port counts as hung. With a hung port, the motion counts as none, and
-    ``released`` as False.
+    If the command port waits or hangs, the result always has a hung port, no motion, and
+    ``released`` False.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

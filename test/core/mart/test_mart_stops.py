@@ -158,9 +158,10 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A late encoder count is not taken for the reply to the lost stop of a turn.
+    """The stop of a turn is lost, and a late encoder count arrives.
 
-    The reply to the stop would contain an angle, and the count looks like a plausible angle.
+    The driver does not take the count for the angle in the reply to the stop, although the numbers
+    are equal.
     """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
@@ -240,7 +241,8 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
 ) -> None:
     """On a good network, the robot has the speed of the next motion within 1.5 s.
 
-    The reply "no motion" to a second stop does not make the driver suspect a restart of the server.
+    The driver reports no restart of the server when the server answers a second stop with "no
+    motion".
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)

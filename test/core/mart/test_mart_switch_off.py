@@ -125,9 +125,9 @@ def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
 
 
 def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
-    """The driver sends no MCS (switch off the motors) if a controlled turn follows a straight move.
+    """A controlled turn follows a straight move, and switches both motors off at its end.
 
-    The turn switches both motors off at its end.
+    So the driver sends no MCS (switch off the motors).
     """
     bench = MartBench("source").ready()
     since = len(bench.written)

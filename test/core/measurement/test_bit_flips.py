@@ -183,10 +183,9 @@ def test_what_is_refused_is_counted_and_told() -> None:
     [(byte, bit) for byte in range(4) for bit in (range(8) if byte < 2 else (0, 7))],
 )
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
-    """The first pose of the board has a wrong heading.
+    """The first pose of the board has a wrong heading. The next two poses are right.
 
-    The next two poses agree on another heading. The odometry uses this other heading, so odom is
-    right.
+    The odometry uses these two poses, so odom is right.
     """
     start = BoardPose(3000.0, -2000.0, 700.0)
     drive = Drive.__new__(Drive)

@@ -93,9 +93,9 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
-    """After a jump that lasts, all readings are released, the first one together with the second.
+    """The filter releases all readings of a jump that lasts, as of a robot set down on a slope.
 
-    A robot that is set down on a slope causes such a jump.
+    The filter releases the first of these readings together with the second.
     """
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)

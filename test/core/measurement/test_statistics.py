@@ -16,9 +16,9 @@ def lost(bench: Bench) -> tuple[int, int]:
 
 @pytest.mark.parametrize("silence_s", [0.04, 0.2, 1.0, 5.0])
 def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: float) -> None:
-    """The line is silent. IMU frames have no counter, so their losses are estimated.
+    """The line is silent, and IMU frames have no counter.
 
-    Four IMU readings count as lost for each lost delta.
+    The driver counts four lost IMU readings for each lost delta.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

@@ -97,9 +97,10 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """A robot drives forward, and reverses within a displacement of 0.1 s.
+    """A robot that is commanded forward reverses within a displacement of 0.1 s.
 
-    This displacement may be as small as a held robot's, but the driver sends Stop within 0.3 s.
+    The driver sends Stop within 0.3 s, although this displacement may look like that of a held
+    robot.
     """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):

@@ -110,7 +110,7 @@ def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it
 ) -> None:
     """The robot turns at 2 rad/s. Then only poses arrive, and they show that the robot is at rest.
 
-    A displacement that is lost later is not taken for a turn.
+    The odometry estimates no motion for displacements that are lost later.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
@@ -187,7 +187,7 @@ def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_
 def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> None:
     """A board restarts after 40 s without data, in which the robot may have turned.
 
-    A drive of 2 m then makes x and y uncertain by 1 to 5 m, because its direction is unknown.
+    The direction of the next drive of 2 m is unknown, so x and y become uncertain by over 1 m.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
@@ -287,9 +287,9 @@ def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(fram
 def test_a_loss_that_a_pose_shows_before_the_frame_is_known_is_bridged(
     frame: str, missing: int
 ) -> None:
-    """A displacement is lost before the heading of the board's coordinate frame is known.
+    """A displacement is lost at the start, before two poses have shown the board's heading.
 
-    The odometry estimates the lost motion when the board's first or second pose shows the loss.
+    The odometry estimates the lost motion when the first or second pose shows the loss.
     """
     odometry, trip = Odometry(SETTINGS), Trip(0.3)
     estimates = []

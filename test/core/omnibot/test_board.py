@@ -163,9 +163,9 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """Three deltas that are lost between two reads are counted as three.
+    """Two reads have more than 2 s of data each. Between the reads, three deltas are lost.
 
-    Each read has more than 2 s of data. A wrap of SEQ in the first read is not taken for a restart.
+    The three deltas are counted. A wrap of SEQ in the first read is not taken for a restart.
     """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]

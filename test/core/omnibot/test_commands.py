@@ -200,9 +200,10 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(max_examples=40, suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """Except for rounding, the velocity computed back from a frame is the commanded one.
+    """The velocity computed back from a frame is the commanded one, except for rounding.
 
-    A word changes by up to 0.5 LSB, or by up to 1.5 LSB to avoid a harmful byte.
+    Rounding changes a number in the frame by up to 0.5 LSB, or by up to 1.5 LSB to avoid a
+    harmful byte.
     """
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)

@@ -12,7 +12,7 @@ IMU = ImuFrame((250, -130, -16380), (1, 2, 3))
 
 
 def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
-    """Return what the decoder knows after a pose with a heading of 100 mrad, and later deltas.
+    """Return the decoder's context after a pose with a heading of 100 mrad, IMU frames and deltas.
 
     ``turns``: turns of the deltas, in 0.1 mrad. ``seqs``: counters of the deltas.
     """

@@ -157,9 +157,9 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """An IMU frame whose end looks like a header is held only in ticks in which a delta is due.
+    """An IMU frame whose end looks like a header is held only if a delta is due next.
 
-    The decoder learns these ticks from the pauses on the line.
+    The decoder learns from idle times of the line when a delta is due.
     """
     made, waited = FrameDecoder(), []
     for tick in range(60):

@@ -57,7 +57,7 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
     """An IMU frame and a delta are lost before a pose.
 
-    The schedule returns 0 lost IMU frames for the pose, and 1 for the frame after it.
+    The schedule returns 0 lost IMU frames for the pose, and 1 for the next frame.
     """
     rhythm = nominal(0)
     for _ in range(4):

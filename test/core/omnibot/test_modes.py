@@ -117,7 +117,7 @@ def test_r_makes_the_mode_unknown(mode: Mode) -> None:
 def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
     """24 IMU frames come before R and one after it.
 
-    The mode is unknown, because R sets the count to 0.
+    The mode is unknown, because the 24 frames no longer count.
     """
     made = tracker(Mode.NOMINAL)
     for _ in range(24):

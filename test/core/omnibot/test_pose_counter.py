@@ -87,10 +87,10 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
     interrupt: Callable[[Sequence], None],
 ) -> None:
-    """After a gap, the counters fit a restart and also a loss of frames.
+    """After a gap, the counters fit both a restart and a loss of frames.
 
-    Then the board is paused, or the port is reopened. The next pose is still ambiguous, because it
-    may refer to a new origin.
+    Then the board is paused, or the port is reopened. The next pose is marked as ambiguous, because
+    it may refer to a new origin.
     """
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1
@@ -127,10 +127,9 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
 def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
     restarted: bool, silent_s: float
 ) -> None:
-    """A delta continues the count after a silence.
+    """A delta continues the count after a silence. A restarted board could send the same count.
 
-    The driver suspects a restart, but marks it as doubtful: a restarted board may have this count
-    by chance. The counter of the next pose decides.
+    The driver suspects a restart, and marks it as doubtful. The counter of the next pose decides.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + silent_s
@@ -223,7 +222,10 @@ def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() ->
 
 @pytest.mark.parametrize("lost", [1, 7, 60, 255, 256, 1280, 1500])
 def test_the_pose_counter_goes_on_while_the_port_is_closed(lost: int) -> None:
-    """The port is closed for a while and the board goes on: no pose shows a restart."""
+    """The board continues to count while the port is closed.
+
+    Afterwards, no delta or pose shows a restart.
+    """
     sequence = Sequence()
     counts = [*range(206), *range(206 + lost, 300 + lost)]
     for count in counts:
@@ -236,9 +238,9 @@ def test_the_pose_counter_goes_on_while_the_port_is_closed(lost: int) -> None:
 
 @pytest.mark.parametrize("first", range(900, 1200, 50))
 def test_after_an_hour_the_pose_counter_does_not_tell_of_a_restart(first: int) -> None:
-    """After an hour with a closed port, the pose counter does not show a restart.
+    """A board runs on while the port is closed for an hour. No pose shows a restart.
 
-    The board's clock is slow by 0.3 %, so the number of wraps of the delta counter is unknown.
+    The number of wraps of the delta counter is unknown, because the board's clock is slow by 0.3 %.
     """
     sequence = Sequence()
     for count in [*range(first, first + 206), *range(first + 90_000, first + 90_050)]:

@@ -81,8 +81,8 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 ) -> None:
     """A board that sends no poses is paused. Then a delta with the count n arrives.
 
-    If the board has restarted, n deltas are lost. The driver suspects this only if at least n
-    deltas would be lost without a restart.
+    If the board has restarted, n deltas are lost, and otherwise m deltas. The driver suspects a
+    restart only if n is at most m.
     """
     sequence = begun(count)
     sequence.pause()
@@ -151,9 +151,9 @@ def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
 
 
 def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
-    """The board's clock is 1 % fast. After a gap of 120 s, the 3029 lost deltas are counted.
+    """A board whose clock is 1 % fast sends 3030 deltas in 120 s, instead of 3000.
 
-    In 120 s, the board sends 3030 deltas instead of 3000.
+    Only the last of these deltas arrives. The driver counts 3029 lost deltas.
     """
     sequence = Sequence()
     sequence.delta(100, 0.0)

@@ -218,7 +218,7 @@ def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> N
 
 
 def test_a_link_that_cannot_be_made_is_named_with_what_to_do(tmp_path: Path) -> None:
-    """The folder of the link does not exist.
+    """The folder of the symbolic link does not exist.
 
     The error message names the link and says what to do.
     """

@@ -153,9 +153,9 @@ def test_datagram_channels_stand_on_ports_in_a_row() -> None:
 def test_a_first_port_that_has_no_next_port_is_chosen_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The system chooses the highest port for the first channel.
+    """The system chooses the highest port for the first channel, so the second has no next port.
 
-    No port is left for the second channel. So the simulator lets the system choose again.
+    Then the simulator lets the system choose again.
     """
     choices = iter([LARGEST])
 

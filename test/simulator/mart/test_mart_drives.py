@@ -117,9 +117,9 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """With a stuck right motor, the drives RM and F fail. F gives the reason "start timedout".
+    """The right motor is stuck, and the drive RM fails without a reason.
 
-    RM gives this reason only after F has failed.
+    Then the drive F fails with the reason "start timedout", and so does the next RM.
     """
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "

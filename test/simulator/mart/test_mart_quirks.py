@@ -25,9 +25,9 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether the server regards a drive (F) as in progress after SL has stopped the robot.
+    """Return whether the server keeps a drive (F) in progress after SL (stop port) has stopped it.
 
-    If so, the server refuses other motions, and a later stop with SM makes the command port hang.
+    If so, the server refuses other motions, and the stop SM makes the command port hang.
     """
     rig = Rig(quirks)
     rig.drive("F")
@@ -51,7 +51,7 @@ def spin_stop_ends_drives(quirks: Quirks) -> bool:
 
 
 def early_stop_is_ignored(quirks: Quirks) -> bool:
-    """Return whether SL does not stop a drive (F) that the server has not acknowledged yet."""
+    """Return whether the server ignores the stop SL before it has acknowledged a drive (F)."""
     rig = Rig(quirks)
     rig.say("F")
     rig.run(0.1)

@@ -147,9 +147,9 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 
 
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
-    """``~/reset`` sets the board's tick counts to 0, but the pose in odom continues.
+    """``~/reset`` sets the board's tick counts to 0, but the pose in odom does not jump.
 
-    No step of the pose reaches 0.25 m. Steps of up to 0.15 m are normal with one report in 400 ms.
+    Consecutive poses differ by less than 0.25 m. Up to 0.15 m is normal with one report in 400 ms.
     """
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for(lambda: odometry)
