@@ -71,7 +71,7 @@ class Ending:
                 signal.signal(number, lambda *_: None)
 
     def begin(self, defect: BaseException | None = None) -> None:
-        """End the driver. Any thread may call this.
+        """Begin to end the driver. Any thread may call this.
 
         ``defect``: the exception that ends the driver, if any. With a defect the exit code is 1.
         """

@@ -35,8 +35,8 @@ RADIATION: Final = dict(zip(RANGE_TYPES, (Range.ULTRASOUND, Range.INFRARED), str
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""State of the wheels: sum of the robot's displacements along the board's axes (m, rad), angles in
-rad, and rates in rad/s (empty if unknown)."""
+"""State of the wheels: summed displacements of the robot along the board's axes (m, rad), wheel
+angles in rad, and wheel rates in rad/s (empty if unknown)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -113,7 +113,10 @@ class OmniBotDriver(Node):
     def create_service(
         self, kind: type, name: str, callback: Callable[[Any, Any], Any], **options: Any
     ) -> Any:
-        """Create a service. A service that sets parameters gets the driver's own callback."""
+        """Create a service.
+
+        If the service sets parameters, the driver's own callback replaces ``callback``.
+        """
         own = {SetParameters: declaration.set_each, SetParametersAtomically: declaration.set_all}
         if kind in own:
             callback = partial(own[kind], self)

@@ -138,7 +138,7 @@ class Publishing:
             self._handlers[type(event)](event, clock_offset_ns)
 
     def publish_state(self) -> None:
-        """Publish the first state, before an event changes it."""
+        """Publish the state at the driver's start, before the first event changes it."""
         self._show(StateChanged(*self._session.shown))
 
     def report_port(self, trouble: str | None) -> None:

@@ -233,8 +233,8 @@ class ModeManager:
     def heard_data(self, now: float, *, estopped: bool) -> None:
         """Record that the board sends data and runs.
 
-        ``estopped``: whether the driver's e-stop is latched. If it is latched, the answer to a
-        start or reset that ends in a running board tells this to the user.
+        ``estopped``: whether the driver's e-stop is latched. When a start or reset has made the
+        board run, the answer mentions a latched e-stop.
         """
         data_at, self._data_at = self._data_at, now
         if self.at_rest:
@@ -283,8 +283,9 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether an earlier P may have been obeyed, or may still arrive. The next P then
-        waits for ``PAUSE_RETRY_S``, because a second P would resume a paused board.
+        ``with_p``: whether an earlier P may have been obeyed, or may still arrive. If True, the
+        driver waits for ``PAUSE_RETRY_S`` before it sends P, because a second P would resume a
+        paused board.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

@@ -87,9 +87,9 @@ class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
     * ``lost``: number of lost displacements whose motion this pose includes. The next
-      DisplacementReading does not count them in its ``lost``.
-    * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame. A
-      displacement before it may have shown the same restart.
+      DisplacementReading does not count them again.
+    * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame. An
+      earlier displacement may have shown the same restart.
     * ``ambiguous``: whether the counters fit both a restart of the board in a gap before this pose,
       and the loss of all displacements in this gap.
     """
@@ -193,10 +193,10 @@ class SampleBoundary:
     * ``ahead``: 1 if the last sample has arrived, at least in part, but was not returned as an
       ImuReading yet; else 0.
     * ``cut``: whether the end of this sample is missing.
-    * ``latest_s``: latest time in s after the read at which the cut sample can be complete; 0
+    * ``latest_s``: latest time, in s from the read, of the arrival of the cut sample's end; 0
       without a cut sample.
-    * ``earliest_s``: earliest time in s after the read at which the cut sample can be complete.
-      Without a cut sample, the next sample counts.
+    * ``earliest_s``: earliest time, in s from the read, of the arrival of the cut sample's end.
+      Without a cut sample, the end of the next sample counts.
     """
 
     ahead: int

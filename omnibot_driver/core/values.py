@@ -13,7 +13,7 @@ else:
     from dataclasses import dataclass
 
     def value(*, frozen: bool, slots: bool) -> object:
-        """Return a ``dataclass`` decorator. At run time, ``frozen`` instances are mutable."""
+        """Return a ``dataclass`` decorator. Only type checkers enforce ``frozen``."""
         return dataclass(slots=slots, unsafe_hash=frozen)
 
 

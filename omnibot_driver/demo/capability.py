@@ -20,8 +20,8 @@ class Capability:
 
     ``title``: name of the board, for the sentence "A simulated ... drives".
     ``imu``, ``sideways``: whether the board has an IMU, and whether the robot can drive sideways.
-    ``ports``: for each address that the simulator prints, the name of the driver's parameter for
-    it. The name is empty if the driver derives this address from another one.
+    ``ports``: names of the driver's parameters for the addresses that the simulator prints, in the
+    same order. A name is empty if the driver derives the address from another one.
     ``real``: arguments of the driver for the real robot.
     ``page``: path of the document about the board.
     """

@@ -254,8 +254,8 @@ class Jobs:
     def cancel(self, why: str) -> None:
         """End the job as failed.
 
-        ``why``: the reason, and after a semicolon what to do (replaced if EXIT was sent). A job
-        that the driver itself began ends without a result.
+        ``why``: the reason, a semicolon, and advice for the user. If EXIT was sent, other advice
+        replaces this advice. A job that the driver itself began ends without a result.
         """
         if self.job in OWN:
             self._clear()

@@ -66,9 +66,8 @@ class Measuring(Starts):
     def _shows_restart(self, before_rad: float | None) -> bool:
         """Return whether the current heading is exactly zero because the server was restarted.
 
-        A heading that only passes through zero was near zero before.
-
-        ``before_rad``: the previous heading, or None.
+        ``before_rad``: the previous heading, or None. If it was near zero, the heading may be zero
+        without a restart.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False

@@ -83,9 +83,9 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Add ``slope`` and ``offset`` to the values learned for a motor that was not measured.
+        """Add to this motor's line the changes that a measurement made to the other motor's line.
 
-        The arguments are the changes that a measurement made to the other motor's line.
+        ``slope``, ``offset``: these changes. This motor itself was not measured.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

@@ -65,8 +65,8 @@ class Motors:
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the motor units for a turn at ``rate_radps``, corrected by the measured rate.
 
-        ``seen_radps``: rate measured with ``units`` in the present turn. The driver does not learn
-        from this measurement.
+        ``seen_radps``: rate measured with ``units`` in the present turn. What was learned about the
+        motors stays unchanged.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))

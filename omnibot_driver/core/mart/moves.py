@@ -128,8 +128,7 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn, the driver first downloads the server's record if it is needed and possible.
-        Otherwise, the driver learns at once from the wheel.
+        After a turn, the driver may download the server's record of the turn before it learns.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):

@@ -37,8 +37,8 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: start time of a controlled move that is in progress, or may be executed a
-        second time. None without such a move, or if the server is lost.
+        ``blind_since_s``: start time of a controlled move that the server executes, or may execute
+        again. None without such a move, or if the server is lost.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

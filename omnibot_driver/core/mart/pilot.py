@@ -47,9 +47,9 @@ next one. In the first STARTS_UP_S (s) after a motion, the delay may be longer."
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
 
-* ``SILENT_S``: since the last reply, in addition to twice the average duration of a query.
-* ``SILENT_AFTER_MOVE_S``: since the last reply, if a duplicate of a move may be running.
-* ``GREET_AGAIN_S``: since the last HELLO.
+* ``SILENT_S``: time since the last reply, plus twice the average duration of a query.
+* ``SILENT_AFTER_MOVE_S``: time since the last reply, if a duplicate of a move may be running.
+* ``GREET_AGAIN_S``: shortest time between two of these queries.
 """
 COMMANDED: Final = (
     "a motion command or a stop arrived during the request; stop sending commands, then call again"

@@ -242,7 +242,7 @@ class Reckoning(CorrectedPose):
 
     @property
     def maybe(self) -> tuple[float, float]:
-        """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
+        """Motion that may be missing in the pose: right wheel's distance in m, and turn in rad.
 
         Both values are zero, except while the last encoder count may be older than the motion.
         """
@@ -250,9 +250,9 @@ class Reckoning(CorrectedPose):
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Return the robot's turn in rad for a distance of the right wheel in m.
+        """Return the turn in rad that moves the right wheel by ``wheel_m`` in a turn on the spot.
 
-        The turn is zero in all motions except a turn on the spot.
+        In any other motion, the result is 0.
         """
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 

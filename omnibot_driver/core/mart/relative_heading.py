@@ -40,8 +40,8 @@ class RelativeHeading:
     """The relative heading within a motion.
 
     * ``told_s``: time of the last accepted heading.
-    * ``from_s``: earliest time at which the server can have measured the last certain heading. A
-      changed heading in a doubtful reply (``Moment.doubtful``) is not certain.
+    * ``from_s``: earliest possible time of measurement of the last certain heading. A changed
+      heading in a doubtful reply (``Moment.doubtful``) is not certain.
     * ``changed_s``: time of the last change of heading.
     * ``same``: number of equal headings since the last change.
     """
@@ -150,8 +150,8 @@ class RelativeHeading:
     def doubt_rad(self, angle_rad: float, at_s: float) -> float:
         """Return the standard deviation, in rad, of the turn since the last heading.
 
-        The result is 0 if ``angle_rad`` certainly has the old zero point, and infinite if a restart
-        of the server certainly gave a new one.
+        A restart of the server sets its heading to zero. The result is 0 if a restart is excluded,
+        and infinite if the new heading ``angle_rad`` proves a restart.
         """
         before_rad = self._angle_rad
         if not self.may_begin_anew or before_rad is None or at_s <= self.told_s:

@@ -38,7 +38,7 @@ MOST_MISSED: Final = 4
 From the measured speeds, the driver finds out which of these changes have arrived at the server.
 """
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""How the driver learns about the motors if an exchange with the server takes ``trip_s`` (s).
+"""How the duration ``trip_s`` (s) of an exchange with the server affects measured motor speeds.
 
 * The averaging window lasts at least ``LEARN_S + LEARN_TRIPS * trip_s``.
 * The standard deviation of a measured speed is multiplied by ``1 + LESS_PER_S * trip_s``.
@@ -52,7 +52,7 @@ LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the driver raises the units of the next RM (forward) if no motor has turned.
 
-The raised units are at most MOST_DEAD, unless the commanded speed needs more.
+The raise ends at MOST_DEAD. The commanded speed may need more units.
 """
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
@@ -60,13 +60,13 @@ HOLD_AFTER_S: Final = 1.0
 integrate the heading error."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Growth of the uncertainty of the wheel speed ratio with each new set-point.
+"""How much less certain a new set-point makes the ratio of the wheel speeds.
 
-The ratio's relative variance grows by a factor times the squared relative change of the set-point.
+The ratio's relative variance grows by factor * (relative change of the set-point)².
 
-* ``COPIED``: factor if the set-point may arrive twice.
+* ``COPIED``: factor in a slow network, in which a set-point may arrive twice.
 * ``MISSED``: factor if the server did not answer the set-point.
-* ``SLOW_TRIP_S``: average duration of an exchange, in s, above which a set-point may arrive twice.
+* ``SLOW_TRIP_S``: average duration of an exchange, in s, above which a network is slow.
 """
 
 
@@ -75,7 +75,7 @@ class SpeedLoop(Motors):
 
     ``trip_s``: average duration of an exchange with the server, in s.
 
-    ``part``: relative size of the last change of the motors' units, summed over both motors.
+    ``part``: last change of the motors' units, divided by the units before; sum over both motors.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -112,10 +112,7 @@ class SpeedLoop(Motors):
         return max(self._least_units, units)
 
     def started(self) -> None:
-        """Record that the motors have turned after a start.
-
-        The next start may use one unit less.
-        """
+        """Reduce the lowest units for the next start by one, because the motors have turned."""
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:

@@ -22,8 +22,8 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-* ``OFF``: in the first EARLY_S (s) of a steady rate, until the driver has learned from a turn.
-* ``OFF_AGAIN``: at all other times. A new start disturbs the motion.
+* ``OFF``: until the driver has learned from a turn, in the first EARLY_S (s) of a steady rate.
+* ``OFF_AGAIN``: otherwise. This limit is higher, because a new start disturbs the motion.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for learning from slow turns, as fractions of the commanded rate.
@@ -107,8 +107,8 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        Send SSP before the turn's check of the IMU. ``delay_s``: longest delay in s of an earlier
-        SSP's copy.
+        Send SSP before the turn's check of the IMU. ``delay_s``: time in s within which a copy of
+        the last SSP can arrive.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:

@@ -85,7 +85,7 @@ class Motion(Enum):
 
 
 QUICK: Final = frozenset({ENC, RMRA, VOLTS, MCSTAT, DOCKED, HELLO})
-"""Queries that are answered at once in any state in which the command port is free."""
+"""Queries that the server answers at once whenever its command port is free."""
 
 MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.UNKNOWN: frozenset({HELLO, SRM, SM}),

@@ -47,7 +47,7 @@ SLOW_STOP: Final = (
     " server left on"
 )
 NO_START_S: Final = 0.75
-"""Time in s after which the reply to a controlled turn (MCR, MCL) proves that a wheel has turned.
+"""Longest duration, in s, of a controlled turn (MCR, MCL) in which no wheel has turned.
 
 If no wheel turns, the server replies 0.6 s after the start; otherwise, after more than 0.75 s.
 """

@@ -99,7 +99,7 @@ class SwitchOff:
         """Record that MCS or MSM was not answered; return whether the driver gives up MCS now.
 
         After MOST_MISSES in a row (MOST_MISSES_DISTURBED in a ``disturbed`` network), the driver
-        allows motions. ``connect`` or ``doubt`` allows MCS again.
+        stops repeating the request, and allows motions. ``connect`` or ``doubt`` allows MCS again.
         """
         self._misses += 1
         if self._misses < (MOST_MISSES_DISTURBED if disturbed else MOST_MISSES):

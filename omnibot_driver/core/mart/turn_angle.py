@@ -20,7 +20,7 @@ class TurnAngle:
     """The angle of the current turn on the spot, or of the last one.
 
     ``spun_rad``: the turn that the wheel has measured, or the recorded angle that ``record`` has
-    accepted. The caller adds returned corrections (rad) to the heading.
+    accepted. The methods return corrections in rad, which the caller adds to the heading.
     """
 
     def __init__(self) -> None:
@@ -40,9 +40,9 @@ class TurnAngle:
         self._may_be_recorded = False
 
     def add(self, turn_rad: float) -> float:
-        """Add a turn measured at the wheel; return the angle that the caller adds to the heading.
+        """Add a turn that the wheel measured; return the angle that the caller adds to the heading.
 
-        The result is zero if the heading already contains the server's angle of the whole turn.
+        The result is zero once the server has reported the angle of the whole turn (``tell``).
         """
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0

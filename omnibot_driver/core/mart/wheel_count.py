@@ -16,8 +16,8 @@ from omnibot_driver.core.mart.moment import Moment
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
 """Tolerance for an encoder count that may be the reply to another query.
 
-The distance since the last count may deviate by DOUBT_M + DOUBT_MPS * (driving time + uncertainty
-of the reply's time), in m and s.
+The distance since the last count may deviate by DOUBT_M (m) + DOUBT_MPS (m/s) * (driving time +
+uncertainty of the reply's time).
 """
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time between them.

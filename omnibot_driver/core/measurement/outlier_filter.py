@@ -30,8 +30,8 @@ Stamped = tuple[Reading, float]
 STILL: Final = 0.08
 """Tolerance of the check for spikes of the IMU, as a fraction of the spike.
 
-The reading after a spike returns within this tolerance. If a bit of one value flips, the other
-values stay within it.
+The reading after a spike equals the reading before the spike within this tolerance. If a spike is a
+flipped bit of one value, the other values stay within this tolerance.
 """
 MOST_HELD: Final = 10
 """Largest number of readings that the filter holds. The first of them is a displacement that
@@ -84,7 +84,8 @@ class OutlierFilter:
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. If True, impossible but finite
-      displacements pass with ``measured`` False, and ``possible`` too if they have a duration.
+      displacements pass, with ``measured`` False. If they have a duration, ``possible`` is False as
+      well.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:

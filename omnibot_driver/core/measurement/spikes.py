@@ -48,8 +48,9 @@ class Spikes:
     ) -> tuple[bool, bool]:
         """Return whether the last call's values were a spike, and whether the new values leap.
 
-        Leaping values change implausibly much. ``periods``: sampling periods since the previous
-        values. ``topmost_bit``: highest bit of the accelerations, in the units of ``values``.
+        Values leap if they change implausibly much. ``periods``: sampling periods since the
+        previous values. ``topmost_bit``: value of an acceleration's highest bit, in the units of
+        ``values``.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False

@@ -43,8 +43,7 @@ class StreamStatistics:
     delay_s: float = 0.0
     """Sum of delays in s: for each of the ``reads``, the age of its newest sample.
 
-    An age can be a few microseconds below 0: stamps always increase, even beyond the time of the
-    read.
+    An age can be a few microseconds below 0, because a stamp can be later than the read.
     """
     squared_delay_s2: float = 0.0
     same_force: int = 0

@@ -18,8 +18,8 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
-A robot is assumed to be held if, in a displacement, it is clearly slower than all set-points of the
-displacement and of this time before it.
+A robot is assumed to be held if it is clearly slower than all set-points of a displacement and of
+the RISING_S before the displacement.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
@@ -32,7 +32,7 @@ a row, or two long ones, can exceed the limit.
 
 
 class FollowingError:
-    """The following error of one robot: the sum of the motion that its set-points do not allow.
+    """The following error of one robot: the sum of its motion beyond what its set-points allow.
 
     * ``slack_mps``, ``slack_radps``: tolerated excess of a velocity, in m/s and rad/s.
     * ``outside``: whether the last displacement's excess was above the slack.

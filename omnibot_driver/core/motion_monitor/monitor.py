@@ -242,7 +242,7 @@ class MotionMonitor:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
 
         While the motion continues, Stop is due at longer and longer intervals. ``begins``: whether
-        the following error exceeds its limit now.
+        the following error exceeds its limit, which begins the fault.
         """
         if not self._error.outside:
             self._stood_s += seconds

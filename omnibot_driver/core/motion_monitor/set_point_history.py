@@ -33,8 +33,8 @@ The decay begins after ``HELD_S``. The value is long enough for robots with a ti
 0.35 s.
 """
 FADED_S: Final = 1.1
-"""Time in s after which a replaced set-point is ignored. At this time, the monitor allows a
-robot less than 2 % of the velocity of the replaced set-point."""
+"""Time in s after which the monitor ignores a replaced set-point. By then, the velocity that this
+set-point still allows has decayed to less than 2 %."""
 UNKNOWN_S: Final = 0.8
 """Time in s, from the first known set-point on, for which the robot may still move because of
 unknown earlier commands."""

@@ -2,10 +2,10 @@
 
 """Wind-up: the extra distance that wheel controllers drive after the robot was held or pushed.
 
-The wheel controllers integrate their errors while the robot is held or pushed. So when it is
+The wheel controllers integrate their errors while the robot is held or pushed. So when the robot is
 released, it moves too fast or backwards, even after another command or Stop.
 
-This module knows velocities; it does not know which velocities the set-points allow.
+Other modules compute which velocities the set-points allow.
 """
 
 import math
@@ -31,8 +31,8 @@ FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants of the wind-up's decay, in s.
 
-``FORGOTTEN_AT_REST_S`` applies while the set-point is rest: if someone holds the robot then, the
-wind-up lasts longer.
+``FORGOTTEN_AT_REST_S`` applies while the set-point is rest, because someone may then hold the
+robot, and the wind-up lasts longer.
 """
 HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""
@@ -57,10 +57,10 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Wind-up in m of the last displacement; the next displacement must confirm the wind-up.
+        """Wind-up in m of the last displacement, which ``way_m`` does not contain yet.
 
-        It is added to ``way_m`` if the robot is held in the next displacement, too. 0: nothing is
-        left to add. None: the robot was not held in the last displacement.
+        This wind-up is added to ``way_m`` if the robot is also held in the next displacement. 0:
+        ``way_m`` contains all wind-up. None: the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
@@ -78,7 +78,7 @@ class WindUp:
     def carry(self, motion: BodyTwist, seconds: float) -> None:
         """Add to the wind-up the distance by which someone moves the robot by hand.
 
-        The caller calls this method only while the set-point is rest.
+        Call this method only while the set-point is zero.
         """
         moved_mps = speed_of(motion) + LEVER_M * abs(motion.yaw_rate_radps)
         self.way_m = min(MOST_M, self.way_m + moved_mps * seconds)

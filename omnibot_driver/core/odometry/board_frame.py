@@ -55,8 +55,8 @@ class BoardFrame:
     def continues(self, told: Pose, gap: Covariance) -> bool:
         """Return whether the board's frame continues, although the pose counter began anew.
 
-        The cause is then a damaged pose: unlike a restart, it loses no displacements. ``gap``:
-        covariance of the motion lost since the last accepted pose.
+        If True, the pose was damaged: a restart would have lost displacements. ``gap``: covariance
+        of the motion lost since the last accepted pose.
         """
         if self.pose is None or self.since_restart is not None:
             return False

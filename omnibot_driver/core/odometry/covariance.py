@@ -26,9 +26,9 @@ UNKNOWN_YAW_VARIANCE: Final = math.pi**2 / 3
 ASTRAY: Final = 0.7
 """Extra position error, in m per driven metre and per rad² of heading variance (see ``Astray``)."""
 ASTRAY_RAD2: Final = 0.03
-"""Variance of the heading, in rad², above which the odometry adds two position errors (``Astray``).
+"""Variance of the heading, in rad², above which the odometry adds the errors of ``Astray``.
 
-Below this limit, the slip of the wheels causes larger position errors.
+Below this limit, these errors are smaller than those of wheel slip.
 """
 
 
@@ -141,7 +141,7 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 class Astray:
     """Two position errors, along and across the motion, that grow with the variance of the heading.
 
-    ``Covariance.carried`` adds the position error that is proportional to the heading's error.
+    They add to the error of ``Covariance.carried``, which is proportional to the heading's error.
     ``m2``: variance of x and of y, in m².
     """
 
@@ -157,8 +157,8 @@ class Astray:
     def move(self, dx_m: float, dy_m: float, rad2: float) -> None:
         """Add the errors of a displacement in the odometry frame.
 
-        ``rad2``: variance of the heading. The more this variance has grown since the previous call,
-        the less the new errors are correlated with the earlier errors.
+        ``rad2``: variance of the heading. The faster this variance grows, the less a way back
+        cancels the errors of the way out.
         """
         # while the variance does not grow, a way back cancels the errors of the way out
         kept = min(1.0, self._rad2 / rad2)
@@ -234,10 +234,10 @@ class Uncertainty:
         )
 
     def halt(self, way_m: float, turn_rad: float) -> None:
-        """Add the uncertainty of a robot that came to rest unseen, because its board restarted.
+        """Add the uncertainty of a robot's motion until it came to rest when its board restarted.
 
-        ``way_m``, ``turn_rad``: mean motion until rest. ``settle`` removes this uncertainty again.
-        The pose gate does not use it.
+        ``way_m``, ``turn_rad``: mean size of this motion. ``settle`` removes this uncertainty. The
+        pose gate does not use this uncertainty.
         """
         variance = min(turn_rad * turn_rad, UNKNOWN_YAW_VARIANCE)
         self._halt += Covariance.diagonal(way_m * way_m, variance)
@@ -247,9 +247,9 @@ class Uncertainty:
         self.gap = self._halt = NOTHING
 
     def bound(self, way_m: float, turn_rad: float) -> None:
-        """Set the uncertainty of all gaps to their known error.
+        """Set the uncertainty of all gaps to the error that the board's pose has shown.
 
-        ``way_m``, ``turn_rad``: this error in m and rad. The error stays uncorrected, because
+        ``way_m``, ``turn_rad``: this error in m and rad. It stays uncorrected, because
         ``use_board_pose`` is False.
         """
         self.gap = Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)

@@ -91,8 +91,8 @@ class DeadReckoning:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Add a motion (``tangent``, twist x time), in the board's body axes, to the odometry.
 
-        ``seconds``, ``stamped_s``: duration of the motion in s, by the board's clock and by the
-        stamps.
+        ``seconds``: duration of the motion in s, by the board's clock. ``stamped_s``: duration in s
+        by the stamps.
         """
         self.track.move(tangent, seconds, stamped_s)
         self.frame.gate.passed(seconds)

@@ -70,8 +70,8 @@ class Odometry:
         self._gap_lost = 0
         """Number of displacements lost in the gap of ``_since_gap``; 0 without such a gap."""
         self._told_lost = 0
-        """Number of lost displacements to add to ``lost`` of the next displacement or pose. Poses
-        that were not accepted have shown these losses."""
+        """Number of lost displacements that were shown by poses which the odometry did not accept.
+        The number is added to ``lost`` of the next displacement or pose."""
         self.reset()
         self._reset_s: float | None = None
         """Time in s of the last reset; None if a displacement has arrived since then."""
@@ -235,8 +235,8 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the pose is in a new frame of the board, which the odometry must adopt.
 
-        ``confirmed``: whether the pose agrees with the last unexpected pose. While no frame is
-        known, a confirmed pose is enough.
+        ``confirmed``: whether the pose agrees with the last unexpected pose. If no frame is known
+        yet, the result is ``confirmed``.
         """
         frame = self._frame
         if frame.pose is None:

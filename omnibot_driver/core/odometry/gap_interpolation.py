@@ -28,8 +28,8 @@ class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after the loss.
 
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
-    * ``missing``: number of lost displacements that poses have shown since the last displacement or
-      accepted pose.
+    * ``missing``: number of displacements lost since the last displacement or accepted pose, as
+      shown by poses.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class GapInterpolation:
     def before(self, told: Pose, waiting: PendingDisplacements) -> Pose:
         """Return the pose before the waiting displacements, if ``told`` is the pose after them.
 
-        The displacements wait for a pose. Motion that was lost among them is interpolated.
+        The displacements wait for a pose. Motion that was lost among them is estimated.
         """
         start, readings = waiting.before(told), waiting.readings
         if not any(reading.lost for reading in readings):
@@ -81,9 +81,9 @@ class GapInterpolation:
     def prove(self, way: Pose = NO_WAY) -> None:
         """Record that a pose was accepted.
 
-        ``way``: correction of the assumed motion since the previous accepted pose; a tangent in
-        body axes. If all displacements since then were lost, ``way`` also corrects ``last``, the
-        newest tangent.
+        ``way``: how the pose corrects the motion assumed since the previous accepted pose; a
+        tangent in body axes. If all displacements since then were lost, this method also corrects
+        ``last``, the newest tangent.
         """
         if self._only_poses and self.missing and self.last is not None:
             tangent, period_s = self.last

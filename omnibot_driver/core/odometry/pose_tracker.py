@@ -65,19 +65,19 @@ class PoseTracker:
         return _times(tangent, self._signed_size).over(seconds), rolling
 
     def way_to(self, place: Pose) -> Pose:
-        """Return the tangent (twist x time) from the robot's best pose to ``place``.
+        """Return the tangent (twist x time) from the best known pose to ``place``.
 
-        The tangent is like the board's reports: in the board's body axes, not corrected by
+        Like the board's reports, the tangent is in the board's body axes, and not corrected by
         ``scale``. It turns the shorter way.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
 
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Move along a tangent (twist x time). The motion took ``seconds`` by the board's clock.
+        """Move along a tangent (twist x time).
 
-        ``stamped_s``: duration in s by the stamps. The published pose moves no farther than the
-        robot can in ``stamped_s``.
+        ``seconds``, ``stamped_s``: its duration in s, by the board's clock and by the stamps. The
+        published pose moves only as far as the robot can drive in ``stamped_s``.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
@@ -101,8 +101,8 @@ class PoseTracker:
     def resume(self, tangent: Pose) -> None:
         """Add the motion during a gap, which a pose of the board has shown.
 
-        The published pose follows no faster than the robot could. ``tangent``: the motion during
-        the gap (twist x time).
+        The published pose takes up this motion no faster than the robot can drive. ``tangent``: the
+        motion during the gap (twist x time).
         """
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
@@ -119,10 +119,10 @@ class PoseTracker:
         self.uncertainty.settle()
 
     def bound(self, tangent: Pose) -> None:
-        """Set the uncertainty of all gaps to their known error.
+        """Set the uncertainty of all gaps to the error that the board's pose has shown.
 
-        ``tangent``: this error (twist x time). The error stays uncorrected, because
-        ``use_board_pose`` is False.
+        ``tangent``: this error (twist x time). It stays uncorrected, because ``use_board_pose`` is
+        False.
         """
         error = _times(tangent, self._size)
         self.uncertainty.bound(error.way_m, error.yaw_rad)

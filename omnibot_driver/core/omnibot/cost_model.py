@@ -273,8 +273,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    The byte must occur in headers. In an IMU frame, it must also be FF, or the last word must
-    differ from that of the previous IMU frame.
+    The byte must occur in headers. If an IMU frame repeats the last word of the previous IMU frame,
+    the byte must be FF.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

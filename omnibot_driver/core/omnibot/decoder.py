@@ -2,10 +2,10 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-A header alone proves nothing: a gyro at rest gives the same bytes. A frame that directly follows an
-accepted one is *in step*. It is accepted, except if evidence speaks against it. All other bytes are
-*uncertain*. They wait for a clear result of the search in ``trellis``; when ``DOUBT_BYTES`` wait,
-the first half is decided anyway.
+A header alone proves nothing: data of a gyro at rest can look like a header. A frame that directly
+follows an accepted one is *in step*. It is accepted, except if evidence speaks against it. All
+other bytes are *uncertain*. They wait for a clear result of the search in ``trellis``; when
+``DOUBT_BYTES`` wait, the decoder decides about the first half.
 
 This module reads no clock, and no input makes it raise an exception.
 """
@@ -233,7 +233,7 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of ``walk`` except the last two; always return False.
+        """Accept the frames of ``walk``, a run of frames, except the last two; always return False.
 
         The last two frames are uncertain, because the bytes after them are unusual.
         """

@@ -60,8 +60,8 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record that a frame of ``kind`` arrived; return how many IMU frames were lost before it.
 
-        ``skipped``: number of discarded bytes before the frame. For a pose, the result is 0, and a
-        later result contains the losses.
+        ``skipped``: number of discarded bytes before the frame. For a pose, the result is 0; the
+        next frame of another kind gives the losses.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

@@ -55,9 +55,9 @@ class InterFrameGaps:
     """The pauses within the bytes that the decoder holds, and what is known of this line's pauses.
 
     * ``byte_s``: time in s that the line takes for a byte.
-    * ``between``: whether pauses are normally between frames, so that a frame begins in the read
-      after a pause, at any byte.
-    * ``sharp``: whether this frame normally begins at the first byte.
+    * ``between``: whether pauses are normally between frames. A frame then begins in the read after
+      a pause.
+    * ``sharp``: whether a frame normally begins at the first byte of the read after a pause.
     * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. After that,
       further confirmations are not counted.
     * ``at_pace``: whether the line was busy for the whole time between the last two reads.
@@ -74,7 +74,7 @@ class InterFrameGaps:
     def doubt(self) -> None:
         """Stop assuming that pauses are between frames.
 
-        Something other than an idle line may have caused the pauses.
+        The pauses between reads may have another cause than an idle line.
         """
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
@@ -105,7 +105,7 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Record a read that begins with a frame. A pause before the read was between frames.
+        """Record a read that begins with a frame: a pause before this read was between frames.
 
         ``pause_s``: time in s since the previous read. ``arrived``: number of bytes in the read.
         """

@@ -90,9 +90,9 @@ _END: Final = attrgetter("end")
 class Gap(NamedTuple):
     """A pause between two reads, caused by an idle line or by a late reader.
 
-    * ``first``, ``before``: the first byte after the pause is at a position from ``first`` to
-      ``before`` - 1 among the held bytes.
-    * ``price``: cost of a frame that contains the pause, if the line was idle.
+    * ``first``, ``before``: the first byte after the pause is one of the held bytes ``first`` to
+      ``before`` - 1.
+    * ``price``: cost of assuming that an idle line caused this pause within a frame.
     * ``pause_s``: time in s between the two reads.
     """
 
@@ -169,7 +169,7 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause in a supposed frame, as shown by the bytes after this frame.
+    """Return the cause of a pause within a supposed frame, judged by the next frame.
 
     The result is UNDECIDED while the next frame, at ``start``, is incomplete. ``first``: the read
     that ended the pause.

@@ -28,8 +28,8 @@ DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and of times that are computed from its counters.
 After minutes of silence, only the board's pose can therefore prove a restart."""
 EARLY_S: Final = 0.2
-"""Tolerance, in s, of the check whether a counter began at zero after the last delta. If the last
-delta was read late, the time since this delta seems too short."""
+"""Tolerance, in s, for the time since the last delta, within which a counter must have reached its
+value. If the last delta was read late, this time seems too short."""
 LONG_GAP_S: Final = 1.0
 """Longest gap before a pose, in s, after which this pose can still show a restart of the board. The
 pose is compared with the last delta, which is too old after a longer gap."""

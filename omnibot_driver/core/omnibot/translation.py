@@ -50,7 +50,7 @@ BEHIND_S: Final = 0.5
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
 """Shortest delay of a read, in s, for which the driver corrects arrival times. A shorter delay may
-not be real, because the board's clock is inaccurate."""
+only be an error of the board's clock."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
@@ -81,8 +81,8 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """Number of IMU frames that the fast path may still decode; it subtracts 1 for each frame.
-        ``_most_singles``: this number before the first subtraction."""
+        """Number of IMU frames that ``single_imu``, the fast path, may still decode. Each frame
+        reduces it by 1. ``_most_singles``: this number at the beginning."""
         self.heard_s = -math.inf
         self._behind_s = 0.0
         """Delay of the last read in s: the time from the sending of its last byte to the read."""

@@ -20,7 +20,7 @@ RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
 """Limit for the mean delay of reads, in s, above which the driver reports late reads. An adapter
-that delivers bytes every 10 ms has exactly this mean delay."""
+that delivers bytes every 10 ms causes this mean delay, 5 ms."""
 LARGEST_SKEW_PPM: Final = 115.0
 """Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0

@@ -82,8 +82,8 @@ class DeviceClock:
         """Time in s of the last read that brought a new tick. If the next new tick is read less
         than half a period later, the last read was late."""
         self._awaited: Point | None = None
-        """Number of the next tick, and the earliest time in s at which the last byte of its sample
-        can arrive."""
+        """Number of the next tick, and the earliest time in s at which this tick's sample can be
+        complete."""
         self._cut_off: Point | None = None
         """The sample that the last read cut off; None if no sample was cut off.
 
@@ -252,7 +252,7 @@ class DeviceClock:
         """Record the delay of a new tick, and the time ``now`` at which the tick was read.
 
         ``lag_s``: arrival minus the time by the fitted clock. If the previous tick was read late,
-        ``lag_s`` replaces the delay of that tick.
+        the delay of the previous tick is dropped.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s

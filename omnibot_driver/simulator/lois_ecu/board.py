@@ -285,7 +285,7 @@ class SimulatedLois:
     def _main_loop(self) -> None:
         """Run the main loop for 1 ms, in which it checks all timers at most twice.
 
-        The first check may have begun in an earlier step.
+        The first check may continue a check from an earlier step.
         """
         for _ in range(2):
             if not self._scan:

@@ -104,7 +104,7 @@ class Encoder:
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._level_from = self._level_to = 0.0
-        """``_level_from``, ``_level_to``: positions of the nearest edges on the two sides of the
+        """``_level_from``, ``_level_to``: positions of the nearest edges before and after the
         sensor, in periods of the disc."""
         self._per_turn = steps / 2
         self._short = short

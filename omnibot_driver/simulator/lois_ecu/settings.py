@@ -25,8 +25,9 @@ class Quirks:
     * ``sign_of_command``: the measured speed has the sign of the target.
     * ``duty_drags_target``: while a negative duty is commanded, and the RPM target is not positive,
       each encoder tick lowers this target by 1. Requires ``ticks_of_forward_targets``.
-    * ``reverse_runs_fast``: the same while the controller's duty is negative, but only until the
-      controller's next step, which uses the lowered target. Requires ``ticks_of_forward_targets``.
+    * ``reverse_runs_fast``: while the controller's duty is negative, and the RPM target is not
+      positive, each encoder tick lowers the target of the controller's next step by 1. Requires
+      ``ticks_of_forward_targets``.
     * ``low_pass_starts_at_zero``: wheels ignore RPM targets until 0x23 is written.
     * ``extra_settings``: the settings 0x21 to 0x23 exist.
     * ``appends_odometry``: 0x12 sends the odometry after the ticks, with command number 0x12.
