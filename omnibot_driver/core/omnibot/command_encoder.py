@@ -128,8 +128,8 @@ class CommandEncoder:
             raise CommandRefused(
                 f"cmd_pose rejected: in the board's own frame the goal is x {pose.x_m:.2f} m, y"
                 f" {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, but the limits are"
-                f" {MAX_WORD / position:.2f} m for x and y, and {MAX_WORD / heading:.2f} rad for"
-                " yaw; call ~/reset to move the origin of this frame to the robot"
+                f" {MAX_WORD / position:.2f} m and {MAX_WORD / heading:.2f} rad; call ~/reset to"
+                " move the origin of this frame to the robot"
             )
         if any(map(begins_with_a_letter, nearest(*counts))):
             raise CommandRefused(
