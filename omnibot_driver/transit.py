@@ -73,8 +73,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: possible times of day at which the message was sent: an estimate by our clock
-      and, while the offset of the sender's clock is unknown, the time by the sender's clock.
+    * ``sent_ns``: possible times of day at which the message was sent: an estimate by our clock,
+      and, while the offset of the sender's clock is unknown, a second time by the sender's clock.
     """
 
     total_s: float

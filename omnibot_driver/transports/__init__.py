@@ -59,16 +59,16 @@ class Transport(Protocol):
     def read(self) -> Packet:
         """Wait for a packet; return an empty packet if none arrives for a while.
 
-        Raises LinkError if no line is left, LinesChanged if one of several was lost or opened
-        again.
+        Raises LinkError if no line is left. Raises LinesChanged if one of several lines was lost or
+        opened again.
         """
 
     def write(self, packets: Packets) -> None:
         """Write all packets.
 
-        A missing line, such as one of several that was blocked for 0.2 s, gets only the bytes that
-        it accepts at once. Raises LinkError, and discards all unsent bytes, if the connection is
-        lost.
+        If there are several lines, a line that was blocked for 0.2 s is regarded as missing. A
+        missing line gets only the bytes that it accepts at once. Raises LinkError, and discards all
+        unsent bytes, if the connection is lost.
         """
 
     def write_if_room(self, packets: Packets) -> int:

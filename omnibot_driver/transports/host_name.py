@@ -39,7 +39,7 @@ class HostName:
     def has_moved(self) -> bool:
         """Return whether the host is silent and its name no longer leads to the address in use.
 
-        A due lookup begins in the background; a later call returns its result.
+        The name is looked up in the background, so only a later call returns the result.
         """
         now = time.monotonic()
         if not self._is_name or now < self._heard_s + SILENT_S:

@@ -67,8 +67,8 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited for 0.2 s.
 
-        If the result is False, the caller must set ``trouble``. If the line is already missing, the
-        result is True.
+        If the result is False, the caller must set ``trouble``. If the line is already missing, no
+        bytes wait, so the result is True.
         """
         if self.port is None:
             return True

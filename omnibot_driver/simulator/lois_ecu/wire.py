@@ -61,8 +61,8 @@ class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
     * ``checks``: whether lines have a checksum.
-    * ``lenient``: whether fields are read as by C's strtol: blanks, a sign and 0x may precede the
-      digits, and any text may follow.
+    * ``lenient``: whether fields are read as by C's strtol, which accepts blanks, a sign and 0x
+      before the digits, and any text after them.
     """
 
     def __init__(self, *, lenient: bool) -> None:

@@ -88,8 +88,8 @@ FIRMWARE = Quirks(
 )
 """Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""Quirks in the public source code. They are the quirks of ``FIRMWARE``, without the one that the
-source code contradicts, but with four that were found only in the source code."""
+"""Quirks in the public source code: those of ``FIRMWARE`` and four that were found only in this
+code, but not ``spin_stop_ends_drives``, which the code contradicts."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {

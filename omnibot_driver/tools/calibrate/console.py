@@ -129,8 +129,8 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    A known uncertainty has two significant digits, but no decimals from 10 up. The values have as
-    many decimals as the uncertainty.
+    A known uncertainty is rounded to two significant digits, or, from 10 up, to a whole number. The
+    values have as many decimals as the uncertainty.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

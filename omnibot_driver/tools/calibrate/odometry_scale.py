@@ -150,7 +150,7 @@ def result(
 
     ``now``: the driver's parameters before the calibration.
 
-    ``balance``: the motors' balance that the driver measured, or None.
+    ``balance``: the value for ``motor_balance`` that the driver measured, or None.
     """
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))

@@ -63,7 +63,8 @@ class Loop:
     def stretch(self) -> float:
         """Factor by which a time constant is multiplied before it is written to the board.
 
-        The board computes its coefficients for ``nominal_s``, but applies them every ``period_s``.
+        The board computes its coefficients for the control period ``nominal_s``. Its real control
+        period is ``period_s``.
         """
         return self.nominal_s / self.period_s
 

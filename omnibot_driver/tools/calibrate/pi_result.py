@@ -44,10 +44,10 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Mean over all steps of the integrated absolute speed error, in s.
+        """Mean over all steps of the time integral of the relative speed error, in s.
 
-        The error is a fraction of the final speed. The integral begins at the first smoothed speed
-        (``Response.rpm``).
+        The relative error is the absolute deviation from the final speed, divided by the final
+        speed. The integral begins at the first smoothed speed (``Response.rpm``).
         """
         errors = []
         for one in self.steps:

@@ -230,7 +230,7 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 def _plant(found: PlantFit, free: Levels) -> Plant:
     """Return the plant of a wheel. Its gain and dead zone come from the speeds at two duties.
 
-    ``found``: the fit at full duty. ``free``: the measurement at half duty.
+    ``found``: the fit at full duty. ``free``: the levels and the speed measured at half duty.
     """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:

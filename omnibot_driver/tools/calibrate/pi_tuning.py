@@ -52,12 +52,12 @@ With Td = 0, an oscillation between control periods would not decay."""
 class Goals:
     """The goals of a tuning, for the response to a step of the set-point.
 
-    * ``overshoot``: largest overshoot, as a fraction of the speed.
+    * ``overshoot``: largest overshoot, as a fraction of the final speed.
     * ``band``: largest deviation of a settled step, as a fraction of the final speed.
-    * ``destination``: set-point, as a fraction of the speed at full duty.
+    * ``destination``: set-point of the step, as a fraction of the speed at full duty.
     * ``settled_s``: settling time above which the tool warns, in s.
-    * ``phase_margin_deg``: smallest phase margin. With None, Td is 0, and ``overshoot`` limits the
-      gain.
+    * ``phase_margin_deg``: smallest phase margin. If it is None, Td is 0, and ``overshoot`` limits
+      the gain.
     """
 
     overshoot: float = 0.05

@@ -270,7 +270,7 @@ class Robot(Listener):
     def _require_unforgotten(self, silence_s: float) -> None:
         """Raise ToolError if no command was sent for longer than the driver's timeout.
 
-        The driver has then stopped the robot. ``silence_s``: time since the last command.
+        In this case, the driver has stopped the robot. ``silence_s``: time since the last command.
         """
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(

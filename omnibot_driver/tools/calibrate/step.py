@@ -79,8 +79,8 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a control law that alternates a wheel between two speeds, and the law's duration in s.
 
-    Each step begins at another time within an odometry delta, so that all steps together show the
-    whole response.
+    The steps begin at different times between two odometry deltas, so that all steps together show
+    the whole response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):

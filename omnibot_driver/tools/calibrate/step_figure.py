@@ -78,8 +78,8 @@ def _draw_predictions(
 ) -> None:
     """Draw each motor's predicted response with the current and with the better gains.
 
-    ``command``: step of the commanded speed. ``load``: loss of speed that a simultaneous step of
-    the load would cause. Both are in counts per tick.
+    ``command``: step of the commanded speed. ``load``: simultaneous step of the load, as the loss
+    of speed that it would cause. Both are in counts per tick.
     """
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):

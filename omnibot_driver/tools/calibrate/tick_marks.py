@@ -85,7 +85,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the number of the mark from which a record fits ``steps`` best.
+    """Return the number of the mark at which a record begins, by the best fit to ``steps``.
 
     ``row``: relative errors of the record's times between ticks. ``steps``: relative errors of the
     distances from each mark to the next.
@@ -97,9 +97,9 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return, for each mark, the relative error of the distance to the next mark.
+    """Return the relative error of the distance from each mark of the encoder to the next one.
 
-    * ``rows``: for each record, the relative errors of the times between its marks.
+    * ``rows``: for each record of ticks, the relative errors of the times between marks.
     * ``firsts``: for each record, the number of its first mark.
     """
     of = np.concatenate(

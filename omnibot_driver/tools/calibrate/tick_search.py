@@ -45,8 +45,8 @@ LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered. The
 slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
-"""Limit for the sum of the relative errors of two successive intervals between encoder ticks. The
-sum is larger if the board has missed a mark in the first interval."""
+"""Limit for the relative errors of two successive times between encoder ticks, added up. The sum is
+larger if the board has missed a mark of the encoder in the first time."""
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record that are not searched for missed marks, because the
 wheel is still so slow that the board notices every mark."""
@@ -136,9 +136,10 @@ class Search:
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return, for each record, the relative errors of its times, assuming evenly spaced marks.
+        """Return, for each record, the relative errors of the times from each mark to the next.
 
-        Each distance between neighbouring marks has one error, which is NaN next to a missed mark.
+        The errors are relative to the times that ``values`` predict for evenly spaced marks. Next
+        to a missed mark, they are NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -151,7 +152,8 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        In all later searches, a time over a missed mark covers two distances between marks.
+        In all later searches, a time with a missed mark in it counts as two distances between
+        marks.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -286,8 +288,8 @@ class Search:
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the times between ticks that ``values`` predict, in s, record after record.
 
-        ``off``: offset of each mark from its evenly spaced position, in ticks. None: the offsets in
-        ``values`` or of an earlier fit.
+        ``off``: offset of each mark from its evenly spaced position, in ticks. None means the
+        offsets in ``values``, or those of an earlier fit if ``values`` has none.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)

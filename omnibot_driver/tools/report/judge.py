@@ -68,7 +68,8 @@ def _missing_imu(log: Log) -> Level:
     """Return the level of the finding that the log has no message of the IMU.
 
     * GOOD: the driver's status "Stream" shows that the board has no IMU.
-    * BAD: this status or a topic shows an IMU, or the log of a single robot lacks this status.
+    * BAD: this status or a topic shows an IMU, or the log is of a single robot and does not contain
+      this status.
     * NOTE: otherwise.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]

@@ -199,7 +199,7 @@ class Recorder:
     def _spans(
         self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
     ) -> tuple[Span, ...]:
-        """Return the spans of time in which the text for a topic's value stayed the same.
+        """Return the spans of time in which a topic's value, converted to text, stayed the same.
 
         ``name``: function that converts a value to its text, which becomes ``Span.what``.
         """

@@ -116,10 +116,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step between two timestamps, the index after the end of its group.
+    """Return the ends of groups of steps. A group begins with a long step between two timestamps.
 
-    A group begins with the long step, and ends before the next long step, or after ``most`` steps
-    (at least one). ``wide``: indices of the long steps.
+    A group ends before the next long step, or after ``most`` steps (at least one). Its end is the
+    index after its last step. ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

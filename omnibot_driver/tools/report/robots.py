@@ -36,10 +36,10 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that match a topic's name, with the robot's namespace and whether they fit.
+    """Return each role that matches a topic's name, with the namespace and whether the topic fits.
 
-    A role fits if ``kind`` is one of its message types. A topic such as ``~/state`` must also
-    belong to a node in ``drivers``.
+    A topic fits a role if ``kind`` is one of the role's message types. A topic such as ``~/state``
+    must also belong to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

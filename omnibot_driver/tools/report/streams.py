@@ -33,7 +33,8 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * One robot: the last rate. If unknown: NaN for two driving wheels, otherwise the OmniBot's.
+        * One robot: the last rate in the diagnostics. If they have none: the rate of the OmniBot,
+          or NaN if the robot has two driving wheels and so is another robot.
         * Several robots: their common rate; NaN if the known rates differ, or if none is known.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]

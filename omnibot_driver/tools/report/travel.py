@@ -15,10 +15,9 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad that show a jump of the pose (a leap).
+"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad above which a pose's change is a jump (a leap).
 
-They apply to the difference between the change of the pose and the motion by the twist. The
-driver's own corrections are smaller.
+The motion by the twist is subtracted from this change. The driver's own corrections are smaller.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
