@@ -52,9 +52,9 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return figures that compare the driver with a minimal program (the floor), and no table rows.
+    """Return figures that compare the driver with a minimal program (the floor), and an empty list.
 
-    The second value is an empty list, because only some boards have additional rows in the report.
+    The list is for additional rows of the report, which only some boards have.
     """
     windows = 2 if quick else 12
     with ExitStack() as stack:

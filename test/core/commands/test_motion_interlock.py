@@ -75,9 +75,9 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """The motion monitor stops a robot at 0 s and 61 s, and at 62 s just after a call of ~/start.
+    """The motion monitor stops a robot at 0 s, at 61 s and, after a call of ~/start, at 62 s.
 
-    None of these stops requires another call of ~/start.
+    None of these stops requires another call of ~/start: a minute or a call separates them.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):

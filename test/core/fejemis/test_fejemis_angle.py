@@ -59,7 +59,7 @@ def test_without_angles_a_command_is_refused_because_of_the_front_board() -> Non
 
 
 def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
-    """If the driver is late and reads nothing for 0.1 s, a refusal blames the computer."""
+    """If the driver reads nothing for 0.1 s, a refusal of motion blames the late computer."""
     bench = nominal()
     bench.run(0.1)
     bench.read_s = 0.1

@@ -110,9 +110,9 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """A line without a checksum loses up to three characters. No angle beyond 90° is read from it.
+    """A line with the front wheel's angle loses up to 3 characters. No angle beyond 90° is read.
 
-    Beyond 90°, the inner wheel would be faster than the outer one.
+    The line has no checksum. Beyond 90°, the inner wheel would be faster than the outer one.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
@@ -146,7 +146,7 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
 def test_rounding_errors_near_90_degrees_are_not_lost() -> None:
     """Near 90°, no relayed angle exceeds 90°, and the mean of the angles is right.
 
-    A rounding error may be added to a later angle.
+    The driver may add a rounding error to a later angle.
     """
     relay = AngleRelay()
     told = [float(relay.text(math.radians(89.7), sums=False)[4:]) for _ in range(200)]

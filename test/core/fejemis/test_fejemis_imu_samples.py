@@ -60,8 +60,8 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
 def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
     """Samples are lost or late, and the driver has counted too many as lost.
 
-    A sample that seems too early reduces this count only as far as necessary: no stamp becomes
-    several periods too old.
+    When a sample seems too early, the driver reduces this count. It does not reduce the count so
+    far that a stamp becomes several periods too old.
     """
     imu, chance = ImuSamples("m/s^2"), random.Random(2)
     arrived_s, pose_s, errors = 0.0, -math.inf, []

@@ -332,9 +332,10 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """Of 24 lines of one kind, only the first seven with an unusual form are rejected.
+    """Of 24 lines of one kind, the first seven with an unusual form are rejected.
 
-    The lines have checksums, and the unusual ones do not come three in a row.
+    The eighth is accepted. The lines have checksums, and the unusual ones do not come three in a
+    row.
 
     ``windows``: number of earlier windows of 24 lines without an unusual form.
     """

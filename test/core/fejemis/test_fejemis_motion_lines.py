@@ -117,7 +117,8 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
     """A stop line and the next line together lose two characters. No false motion is read.
 
-    An empty line between them keeps the next line's checksum out of the stop line (``rc 2 0 092``).
+    The driver writes an empty line between the two lines. Otherwise, the next line's checksum could
+    continue the stop line's last number (``rc 2 0 092``).
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -254,7 +255,7 @@ def test_without_sums_the_drive_board_gets_the_speed_of_the_outer_wheel() -> Non
 def test_without_sums_a_whole_speed_keeps_its_decimal_point() -> None:
     """The speed 1 m/s is written as ``1.``, so the line is ``rc 2 1. 0``.
 
-    If the line loses its last space, the speed is still ``1.0``.
+    If the line loses its last space, it is ``rc 2 1.0``, and the speed is still 1 m/s.
     """
     assert plain_drive_line(1.0, 0.0) == b"rc 2 1. 0"
     assert plain(b"rc 2 1.0\n") == [(2.0, 1.0, 0.0)]

@@ -54,8 +54,8 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
 def test_the_first_pose_after_a_restart_says_how_long_ago_the_board_restarted() -> None:
     """The board restarts, and its first pose comes 0.3 s later.
 
-    The displacement says that the restart was 0.3 s ago. The odometry needs this time, because the
-    robot may have driven until the restart.
+    The displacement of this pose says that the restart was 0.3 s ago. The odometry needs this time,
+    because the robot may have driven until the restart.
     """
     odometry = PoseOdometry(TRACK_M)
     odometry.pose(BoardPose(50.0, 1.0, 0.0, 0.0, 3))

@@ -311,8 +311,8 @@ def motion(
 ) -> Drive:
     """Drive one of the motions ``MOTIONS`` or ``VARIED``, and return the outcome.
 
-    The encoders begin at random positions between two ticks. ``Rig`` describes ``loss``,
-    ``reads_s`` and ``own_periods``.
+    The encoders begin at random positions between two ticks. ``loss``, ``reads_s``,
+    ``own_periods``: as in ``Rig``.
     """
     rig = Rig(settings, ours, loss=loss, reads_s=reads_s, own_periods=own_periods)
     random = Random(f"encoders {settings.seed}")

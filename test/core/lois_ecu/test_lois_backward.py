@@ -62,7 +62,8 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """The odometry detects that a wheel was at rest before the driver started it again.
 
-    The odometry subtracts the distance that it has added since the reported speed last changed.
+    The board still reported an old speed for this wheel. The odometry subtracts the distance that
+    it has added since this speed last changed.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)

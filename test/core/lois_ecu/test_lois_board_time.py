@@ -109,7 +109,7 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """The board's clock jumps by ``leap_s``.
 
-    By this clock, the next tick report has a delay of −``leap_s`` instead of about 0. The driver
+    By this clock, the next tick report seems delayed by −``leap_s`` instead of about 0. The driver
     regards this delay as irregular.
     """
     board, now = settled_on_time(), 0.2 * 60

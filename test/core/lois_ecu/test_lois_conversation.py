@@ -163,7 +163,8 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
     """A robot that was stopped starts again at any speed, even without feed-forward.
 
-    The driver clears the last speed of each wheel, which the firmware keeps after a stop.
+    After a stop, the firmware keeps the last speed of each wheel, which would prevent a slower
+    start. The driver clears this speed.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings())
     rig.run(5.0)

@@ -53,7 +53,7 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
     """The driver requests a date, which confirms the settings, but also ends the periodic dates.
 
-    The board then has the user's period of the date again.
+    Afterwards, the board again sends dates with the period that the user has set.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

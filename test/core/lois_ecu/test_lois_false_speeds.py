@@ -48,8 +48,7 @@ class Reports:
         * ``rpm``: reported speeds of the left and the right wheel in RPM.
         * ``ticks``: newly counted ticks of the left and the right wheel.
         * ``still``: whether the board repeats its last odometry report.
-        * ``passed_s``: time in s that the board assumes for the motion at ``rpm``; unused if
-          ``still``.
+        * ``passed_s``: time in s for which the board's pose moves at ``rpm``; unused if ``still``.
         """
         self._now += PERIOD_S
         left, right = (one * UNIT_MPS for one in rpm)

@@ -236,7 +236,7 @@ def true_pose(bench: Bench) -> Pose:
     ("firmware", "stall_s"), [("documented", 0.75), ("documented", 3.0), ("firmware", 1.5)]
 )
 def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stall_s: float) -> None:
-    """The pose is right and the twist is plausible after a stall of the driver during a drive."""
+    """The driver stalls during a drive. Then the pose is right, and the twist is plausible."""
     bench = Bench(firmware)
     error_m, _ = stalled_drive(bench, stall_s)
     assert error_m < 0.06

@@ -72,7 +72,8 @@ def periods_written(bench: Bench, ticks_ms: int) -> int:
 def test_a_long_period_is_written_four_times() -> None:
     """The driver writes a period of 0.5 s for the tick reports at least four times.
 
-    The driver cannot detect a lost line: the board's own period, 0.4 s, is nearly the same.
+    The board's own period, 0.4 s, is so close to 0.5 s that the driver cannot detect whether the
+    board has received the setting.
     """
     bench = Bench("firmware", own_periods=True)
     bench.run(5.0)

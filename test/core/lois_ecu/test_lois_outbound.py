@@ -103,7 +103,7 @@ def test_settings_that_lose_up_to_two_characters_never_command_a_motion(with_sum
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """A run of adjacent characters is lost from successive lines. The run is shorter than a line.
+    """Adjacent characters of one line, or of two successive lines, are lost: fewer than a line has.
 
     The remaining characters never form another valid line.
     """

@@ -179,9 +179,10 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 
 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
-    """A new resolution applies to the proof of a reset that is already in progress.
+    """A new resolution is set during a reset. The proof of the reset uses the new resolution.
 
-    After the reset, a wheel rolls 250 ticks: a quarter turn by the new resolution.
+    After the reset, a wheel has counted 250 ticks. This is few enough for the proof only by the new
+    resolution: a quarter turn.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

@@ -77,10 +77,10 @@ def test_a_robot_with_such_encoders_drives_out_and_back(
 
 @pytest.mark.slow
 def test_a_new_resolution_applies_while_the_driver_runs() -> None:
-    """A new ``ticks_per_revolution`` applies at once, and ends the rejection of reports.
+    """A new ``ticks_per_revolution`` applies at once, while the driver runs.
 
-    With the wrong value, the counts of a fast wheel are implausible, and a notice names the
-    parameter.
+    With the old, wrong value, reports of a fast wheel are rejected, and a notice names the
+    parameter. With the new value, no report is rejected.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=60), steps=1000)
     bench.drive_on(0.65, 3.0)

@@ -132,8 +132,8 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
     """If most reports are lost, eleven equal speeds make the detector certain of a wheel's rest.
 
-    The reports of the wheel's slowing down may be lost. Without losses, equal speeds alone show no
-    rest.
+    Without losses, equal speeds alone show no rest, because the reports would show the wheel slow
+    down.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2

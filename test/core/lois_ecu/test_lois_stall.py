@@ -60,9 +60,9 @@ def test_wheels_that_tick_do_not() -> None:
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """A wheel that is commanded backward looks stalled if the board's pose does not change.
+    """A wheel that is commanded backward counts as stalled if the board's pose does not change.
 
-    The public firmware counts no ticks of such a wheel.
+    Ticks cannot show this, because the public firmware counts no ticks backward.
     """
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
@@ -129,7 +129,8 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
     """With feed-forward, a wheel may roll at a constant speed above its set-point.
 
-    This speed shows a stall only if the other wheel's reported speed changes meanwhile.
+    The wheel looks stalled only if its reported speed stays constant while the other wheel's
+    changes.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -154,8 +155,8 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
     """The odometry assumes a wheel at rest, but the board reports a speed above the set-point.
 
-    The wheel looks stalled: the speed controller uses the reported speed, so the wheel gets no
-    power to start.
+    The wheel looks stalled: because of the reported speed, the board's controller gives it no
+    power.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))

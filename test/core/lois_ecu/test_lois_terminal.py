@@ -62,7 +62,8 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive_s: float) -> None:
     """The driver writes a terminal mode only after the robot's standstill is proved.
 
-    In a terminal mode, the board reports no motion. No notice says that the stop is unconfirmed.
+    In a terminal mode, the board reports no motion, so the stop could not be confirmed. No notice
+    says that the stop is unconfirmed.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, drive_s)
@@ -79,9 +80,9 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode, which has overwritten a setting of the board.
+    """The user ends a terminal mode. The mode has overwritten a setting (left short correction).
 
-    The driver restores this setting (left short correction), and reports the end of the mode once.
+    The driver restores this setting, and reports the end of the mode once.
 
     ``hears``: whether lines reach the board in the first 1.3 s.
     """

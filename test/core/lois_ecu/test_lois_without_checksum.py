@@ -40,8 +40,8 @@ def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
 def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
     """The driver writes the settings in a drive.
 
-    The left short correction (a speed factor) keeps its value. Regression: the last line was the
-    mode line, which sets the correction to almost 0.
+    The left short correction (a speed factor) keeps its value. Regression: the driver wrote the
+    mode last, and this command also sets the factor to almost 0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
@@ -59,8 +59,8 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
 def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
     """The driver writes the settings on a line that loses 1 % of the bytes.
 
-    The mode line sets a speed factor (left short correction) to almost 0. Each writing of the
-    settings restores this factor.
+    The command for the mode also sets a speed factor (left short correction) to almost 0. After the
+    settings are written, this factor is right again.
     """
     rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
     rig.run(6.0)

@@ -49,7 +49,7 @@ def on(
 
 
 def reach(bench: MartBench, goal: Pose) -> str:
-    """Command the goal. Wait until the driver reports "over", or the session has dropped the goal.
+    """Command the goal. Wait until its progress is "over", or the session has dropped the goal.
 
     Return the texts of all notices that came in this time, joined to one text.
     """

@@ -113,7 +113,7 @@ def ready(world: World, word: str) -> bool:
 
 
 def table(state: State, word: str, motion: Motion) -> bool:
-    """Return whether the tables of the real driver allow ``word`` in this state and motion."""
+    """Return whether the real driver may send the command ``word`` in this state and motion."""
     return may_say(state, BY_TEXT[word], motion)
 
 
@@ -147,10 +147,10 @@ def steps(world: World, allowed: Allowed) -> Iterator[Step]:
 
 
 def _ends(world: World) -> Iterator[Step]:
-    """Yield the steps in which a controlled move ends.
+    """Yield the possible steps at the end of a controlled move.
 
-    If a late copy of a move has arrived, the server ignores the copy, or executes it after the
-    move.
+    If a late copy of a move has arrived, there are two steps: the server ignores the copy, or
+    executes it after the move.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -280,8 +280,8 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply.
 
-    ``late``: whether the reply may belong to an earlier command. For a check, a controlled move and
-    MSM (end of direct control), the driver ignores such a reply.
+    ``late``: whether the reply may belong to an earlier command. The driver ignores a late reply
+    during a check of the IMU, a controlled move or MSM (end of direct control).
     """
     driver = world.driver
     state = driver.state

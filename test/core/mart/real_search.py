@@ -187,8 +187,8 @@ def eights() -> Iterator[Trial]:
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials of one sequence of user commands, each with one disturbed datagram.
 
-    In each direction, only the first datagrams are disturbed: at most ``MOST_DATAGRAMS`` for each
-    command. Each of these datagrams has one trial for each fault in ``FATES``.
+    There is one trial for each fault in ``FATES`` and each of the first datagrams in each
+    direction: at most ``MOST_DATAGRAMS`` datagrams for each user command.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
@@ -199,7 +199,7 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
 def beginnings() -> Iterator[Trial]:
     """Yield the trials in which a driver starts while the server may be executing a command.
 
-    There is one trial for each command in ``MET`` with each interruption of the network.
+    There is one trial for each motion in ``MET`` with each interruption of the network.
     """
     for met, away_s, back_s in product(MET, AWAY_S, BACK_S):
         for ways in ((0, 1), (0,), (1,)):

@@ -11,9 +11,10 @@ from omnibot_driver.core.mart.words import Word
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether the replies show that a motion began before its stop, or None if unclear.
+    """Return whether the replies show that a motion began before its stop; None if this is unclear.
 
-    The motion is requested at 8 s, its stop at 10 s and 10.3 s. Each reply: time in s, and bytes.
+    The driver requests the motion at 8 s, and its stop at 10 s and 10.3 s. Each item of ``replies``
+    has the time in s and the bytes.
     """
     stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
     stop.due(10.0)

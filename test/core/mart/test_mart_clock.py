@@ -45,7 +45,8 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
     """After a drive, the driver never sets a correct clock back.
 
-    The server ignores seconds, so the driver sends the next full minute shortly before it begins.
+    The server ignores seconds: the current minute would set the clock back. So the driver sends the
+    next full minute shortly before it begins.
     """
     fields = clock_fields(now_s, may_set_back=False)
     assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))
@@ -67,8 +68,8 @@ def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
     """The user sets the server's clock back between two drives.
 
-    RM computes the heading by this clock, so the second drive begins with an unusable heading and
-    needs a second RM. One notice names the clock.
+    RM (forward drive) computes the heading by this clock. So the second drive begins with an
+    unusable heading and needs a second RM. One notice names the clock.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

@@ -227,9 +227,9 @@ def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
 
 
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
-    """After three unanswered stops, the driver uses the stop port.
+    """After three unanswered stops, the driver uses the server's second port, the stop port.
 
-    From then on, the driver ignores replies.
+    From then on, a reply no longer proves that the motion has ended.
     """
     stop = stopping(Motion.REVERSE)
     said = [word for tick in range(60) for word in stop.due(10.0 + 0.1 * tick)]
@@ -300,7 +300,8 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
     """The reply to a turn gives an angle of 3°, which contradicts the encoder.
 
-    The 3 is in fact an old encoder count, so the odometry computes the turn from the encoder alone.
+    The 3 is an old encoder count and no angle, so the odometry computes the turn from the encoder
+    alone.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

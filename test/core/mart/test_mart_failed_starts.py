@@ -75,10 +75,9 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """If a server rejects RM (forward drive) but the robot moves, the motors are switched off.
+    """A server rejects RM (forward drive) but moves the robot, and then ignores stop commands.
 
-    The server ignores stop commands, so the driver switches the motors off, and then refuses
-    motion.
+    The driver switches the motors off, and then refuses motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)

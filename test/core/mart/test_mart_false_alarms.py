@@ -25,7 +25,7 @@ The wheels turn for longer after a stop than the server waits for a standstill.
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
     """The time without a change of the heading is counted from the first heading of a drive.
 
-    Before this heading, which comes 0.7 s after the start, a change cannot be seen.
+    This heading comes 0.7 s after the start. An earlier change cannot be seen.
     """
     heading = RelativeHeading()
     heading.begin(10.0, anew=True)
@@ -66,8 +66,8 @@ def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
 ) -> None:
     """A slow stop of a heavy robot does not discard the next goal.
 
-    The server reports a failure, and one notice says that the wheels still turned. The robot
-    reaches the goal.
+    One notice says that the wheels still turned after the server's stop. The robot reaches the
+    goal.
     """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
     bench.command(*before, 3.0)
@@ -170,9 +170,9 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
 
 
 def test_each_reply_delays_the_report_of_a_silence_even_if_it_has_no_value() -> None:
-    """Every reply shows that the server is not silent, even a reply without a measurement.
+    """The last reply before a silence has no measurement, only the server's name.
 
-    The last reply before the silence has only the server's name.
+    This reply also delays the report of the silence.
     """
     bench = MartBench().ready()
     bench.speaks = False

@@ -96,9 +96,10 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 
 
 def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
-    """A goal that is not reached after ``MOST_MOVES`` moves is discarded.
+    """The network loses every straight move, so the robot does not reach its goal.
 
-    The network loses every straight move. A notice says how far away the goal is.
+    After ``MOST_MOVES`` moves, the driver discards the goal. A notice says how far away the goal
+    is.
     """
     bench = MartBench().ready()
     receive = bench.robot.receive

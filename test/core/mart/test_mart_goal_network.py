@@ -49,9 +49,9 @@ def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed
 
 
 def test_a_goal_that_another_cause_ends_is_noticed() -> None:
-    """The e-stop ends a goal, and the driver does not report this end.
+    """The tests' function ``reach`` returns within 30 s if the e-stop ends the goal.
 
-    The tests' function ``reach`` returns nevertheless, within 30 s.
+    The driver does not report this end.
     """
     bench = MartBench("source").ready()
 
@@ -70,7 +70,7 @@ def test_a_goal_that_another_cause_ends_is_noticed() -> None:
 def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -> None:
     """A goal is cancelled while its move waits for a late HELLO (name query).
 
-    The wait of the next goal is not shorter: its limit is also 2 s.
+    The move of the next goal also waits, with the same limit of 2 s.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.3, 0.0, 0.0)
