@@ -21,8 +21,8 @@ def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
 
     ``now_s``: present time in s since 1970.
 
-    ``may_set_back``: whether TIME may set the clock back. If not, the result is None except
-    in the seconds ``ENDS_S`` of a minute.
+    ``may_set_back``: whether TIME may set the clock back. If not, TIME is allowed only in the
+    seconds ``ENDS_S`` of a minute, with the next full minute; at other times, the result is None.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -205,8 +205,8 @@ class Board(Protocol):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that are due because time has passed. Called at ``wake_at``.
 
-        The readings show that the board is alive, except OdometryReadings, NoticeReadings and
-        results of requests.
+        The driver may have made OdometryReadings, NoticeReadings and results of requests itself.
+        All other readings show that the board is alive.
         """
         return []
 

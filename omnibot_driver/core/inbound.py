@@ -52,8 +52,9 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes; return the IMU estimates to publish at once. Call ``process`` afterwards.
 
-        After a change of mode, ``hear`` itself calls ``process``, adds the estimates to the
-        reporter's events, and returns an empty list.
+        After a change of mode, ``hear`` also calls ``process`` itself, adds the estimates to the
+        reporter's events, and returns an empty list. The caller calls ``process`` in this case,
+        too.
         """
         self._liveness.came_at = now
         before = self._board.mode

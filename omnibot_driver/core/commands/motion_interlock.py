@@ -10,8 +10,8 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Two stops within this time, in s, are assumed to have the same cause. After the second stop, the
-user must act before motion is accepted again.
+"""Two stops within this time, in s, are assumed to have the same cause. After the second stop,
+motion is refused until the user calls ~/start or uses the e-stop (``Until``).
 """
 
 
@@ -72,7 +72,7 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Restart the time without commands after which a refusal can end: ``timeout_s`` (s).
+        """Begin a new wait of ``timeout_s`` (s) without commands. After it, a refusal can end.
 
         Call this method after a refused command, and after a stall of ``stalled_s`` (s).
         """

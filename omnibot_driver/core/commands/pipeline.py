@@ -41,7 +41,7 @@ class CommandPipeline:
 
     * ``policy``: the command in effect, its expiry and the e-stop latch.
     * ``monitored``: whether the motion monitor is enabled.
-    * ``obeys``: False for a recording.
+    * ``obeys``: whether a board obeys the commands; False while a recording is played back.
     """
 
     def __init__(

@@ -18,8 +18,7 @@ from omnibot_driver.core.packets import Packets
 STOPPING_S: Final = 1.05
 """Shortest time in s for which Stop is repeated.
 
-At least 1 s passes from the first Stop to the last, because successive Stops are at most 0.05 s
-apart.
+Stop is sent at least every 0.05 s, so the last Stop is sent at least 1 s after the first.
 """
 UNPROVED_S: Final = 5.0
 """Longest time, in s, for which Stop is repeated without proof that the robot stands still."""

@@ -132,7 +132,7 @@ class SteadySetpoint:
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
-        """Return the motion order to send to the board. The order never changes."""
+        """Return the order to send to the board. Every call returns the same order."""
         return self._order
 
     def check_anew(self) -> None:
@@ -178,7 +178,7 @@ class GoalSetpoint:
         self.check_anew()
 
     def order(self, now: float) -> Order:
-        """Return the motion order to send to the board. The order never changes."""
+        """Return the order to send to the board. Every call returns the same order."""
         return self._order
 
     def check_anew(self) -> None:

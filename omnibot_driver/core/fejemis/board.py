@@ -268,8 +268,8 @@ class FejemisBoard(Board):
     def switch_off(self) -> Packets:
         """Return lines that switch off the brush and the lift.
 
-        If the user has set the colour of the LED strip, the lines also end this colour: the front
-        board shows its own lights again.
+        If the user has set the colour of the LED strip, the lines also let the front board show its
+        own lights again.
         """
         return self._ports.ending("front", *self._upkeep.machine.switch_off())
 

@@ -206,7 +206,8 @@ def _near(
 ) -> bool:
     """Return whether the board's numbers equal the wanted ones, except for rounding.
 
-    ``digits``: for each number, the value of one step of its last digit; empty if unknown.
+    ``digits``: for each number, the value of its last decimal place (0.01 for 1.23); empty if
+    unknown.
     """
     exact = digits or (math.inf,) * len(wanted)
     return len(told) >= len(wanted) and all(

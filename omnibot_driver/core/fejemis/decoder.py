@@ -40,10 +40,10 @@ class FejemisDecoder:
 
     * ``sums``: whether the board's lines have checksums; None while unknown.
     * ``changed``: whether ``sums`` has changed. The caller resets this flag.
-    * ``doubtful``: with ``line_sums`` auto, whether the last line except heartbeats contradicts
-      ``sums``.
-    * ``contradicted``: with ``line_sums`` on or off, whether the last line contradicts
-      ``line_sums``.
+    * ``doubtful``: whether the last line except heartbeats contradicts the learnt ``sums``
+      (``line_sums`` is auto).
+    * ``contradicted``: whether the last line contradicts the user's setting (``line_sums`` is on or
+      off).
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:
@@ -112,7 +112,7 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """Update ``sums`` or ``contradicted`` from a heartbeat.
+        """Learn from a heartbeat whether the board sends checksums, or check the user's setting.
 
         ``with_sum``: whether this heartbeat has a checksum.
         """

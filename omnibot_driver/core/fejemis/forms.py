@@ -11,10 +11,10 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Limits for the number of lines, among 24 of one kind, that differ from the learnt form.
+"""Limit for the lines without a checksum, among 24 of one kind, that differ from the learnt form.
 
-At the limit, the driver accepts every form of this kind of line. ``VARIES`` is for correct
-checksums.
+At the limit, the driver accepts every form of this kind of line. ``VARIES`` is the limit for lines
+with a correct checksum.
 """
 OF: Final = 24
 

@@ -32,7 +32,7 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """The streams to subscribe to on each board, with their periods in ms.
 
-The driver never requests ``confs`` with the line ``confsi``: if ``confsi`` lost its last letter,
+The driver never sends ``confsi``, the request for ``confs``: if ``confsi`` lost its last letter,
 the board would set its geometry to zero.
 """
 SUBSCRIPTIONS: Final = {

@@ -18,8 +18,8 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit, in sampling periods, for the time between the arrivals of two successive late samples.
 
-Above this limit, a sample was lost before them. Below this limit, they are late because the host
-has stalled.
+Above this limit, a sample was lost before the two samples. Below this limit, the two samples are
+late because the host has stalled.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""

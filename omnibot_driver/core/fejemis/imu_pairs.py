@@ -25,7 +25,8 @@ PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
 """Limit, in s, for the time between a gyro line and an acceleration line that form a pair.
 
-From this limit on, the pair is used only if the next pose shows that no lines are missing.
+If the time reaches this limit, the pair is used only if the next pose shows that no lines are
+missing.
 """
 SILENT_S: Final = 0.1
 """Limit, in s, for a time without gyro and acceleration lines.
@@ -55,7 +56,7 @@ PATIENCE: Final = 60
 """Number of measured intervals after which the driver decides which line of a sample comes first.
 
 The intervals are between a gyro line and an acceleration line. The driver decides earlier if the
-magnitude of the evidence reaches ``KNOWN_S``.
+evidence is strong enough (``KNOWN_S``).
 """
 MOST: Final = 10
 """Largest magnitude of the counters which show whether a kind of line comes within IMU pairs."""
@@ -150,8 +151,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line. ``kind``: its keyword.
 
-        A pair that waits for its second line is given up, unless such lines usually come within a
-        pair.
+        A pair that waits for its second line is given up if lines of this kind do not usually come
+        within a pair.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:

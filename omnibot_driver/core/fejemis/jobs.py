@@ -287,8 +287,8 @@ class Jobs:
 def _answers(role: Role, message: Message) -> bool:
     """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
-    The boards do not answer ``eer`` (load a configuration) itself. Some front boards do not know
-    the query ``fwoi``: their "unhandled" counts as an answer.
+    The boards do not answer ``eer`` (load a configuration). A front board that does not know the
+    query ``fwoi`` answers "unhandled". This answer is also accepted.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

@@ -30,9 +30,10 @@ ANGLE_COST: Final = 1e4
 factor of 2.7 (e) costs 1.
 """
 SLOWEST: Final = 30.0
-"""The drive board gets the linear speed 0, or at least the outer wheel's speed / ``SLOWEST``.
+"""Largest ratio of the outer wheel's speed to the linear speed that is sent to the drive board.
 
-For backward motion, the linear speed is never 0, because 0 has no minus sign.
+For forward motion, the linear speed can also be 0. For backward motion, it cannot, because 0 has no
+minus sign.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.

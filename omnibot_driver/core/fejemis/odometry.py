@@ -92,13 +92,12 @@ class PoseOdometry:
         """
         self._doubted: BoardPose | None = None
         self._agreed = 0
-        """How often in a row a rejected pose has agreed with the pose before it, which was
-        rejected, too."""
+        """Number of successive rejected poses that each agree with the previous rejected pose."""
         self._driven: Pose | None = None
         """Motion from the last accepted pose to the last rejected pose; None while it is unknown.
 
-        The wheel speeds give the motion to the first rejected pose. The poses give the rest, unless
-        the origin moves again.
+        The motion to the first rejected pose comes from the wheel speeds, later motion from the
+        poses. When the origin of the board's poses moves again, the wheel speeds are used instead.
         """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
@@ -218,8 +217,8 @@ class PoseOdometry:
     def _driven_to(self, pose: BoardPose, since_s: float) -> Pose | None:
         """Return the motion from the last accepted pose to ``pose``, by the wheel speeds.
 
-        None if the wheel speeds are unknown, or if rounding may explain that ``pose`` was rejected.
-        ``since_s``: time in s since the accepted pose.
+        None if the wheel speeds are unknown, or if ``pose`` may have been rejected only because of
+        rounding. ``since_s``: time in s since the last accepted pose.
         """
         assert self._pose is not None
         digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)

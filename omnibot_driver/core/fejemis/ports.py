@@ -76,8 +76,8 @@ class Ports:
     def identify(self) -> bool:
         """Find out which board is at which port. Call this after a heartbeat.
 
-        Return whether the boards have exchanged their ports since both were last known. Initially,
-        the drive board is expected at the first port.
+        Return whether the boards have exchanged their ports since the ports of both boards were
+        last known. Initially, the drive board is expected at the first port.
         """
         first, second = (half.role for half in self.halves)
         if first == second:
@@ -115,8 +115,8 @@ class Ports:
     def ending(self, role: Role, *texts: bytes) -> Packets:
         """Return lines that stop or switch off something on the board with this ``role``.
 
-        While the port of this board is unknown, the lines go to each port without a known board, or
-        else to both ports.
+        While the port of this board is unknown, the lines go to each port whose board is unknown.
+        If the driver knows the boards at both ports, the lines go to both ports.
         """
         if self.half(role) is not None:
             return self.line(role, *texts)

@@ -14,7 +14,7 @@ AccelerationUnit = Literal["m/s^2", "g"]
 class Written(Enum):
     """Settings that the driver can write to a board.
 
-    Each value is the command that writes the setting.
+    The value of each member is the board's command that writes this setting.
     """
 
     WHEELS = "confw"

@@ -21,9 +21,9 @@ STILL_ALIGNED_RAD: Final = math.radians(10.0)
 angle, in rad, at which a turn on the spot may begin, and may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Angle, in rad, that sets the tolerance of the body's velocity while the front wheel turns.
+"""Tolerance of the body's velocity while the front wheel turns, as an angle in rad.
 
-The tolerance, in m/s, is the commanded speed at the front wheel times the sine of this angle.
+The tolerance in m/s is the commanded speed at the front wheel times the sine of this angle.
 """
 
 

@@ -35,7 +35,8 @@ The clock begins anew if at least ``AGAIN`` implausible board times in a row agr
 EARLIES_WITHIN_S: Final = 1.0
 """Limit, in s, for the time from the first to the last of three lines that seem early.
 
-If their board times agree, the clock began with a late line, and begins anew.
+If their board times agree, a late line began the clock, so that later lines seem early. The clock
+then begins anew.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
@@ -66,9 +67,10 @@ class TeensyClock:
         ``_odd``: the first of these board times, and its time of arrival.
         """
         self._earlies: list[tuple[float, float]] = []
-        """Board times of lines that seem to arrive early by the clock, each with its arrival time.
+        """Board time and arrival time of each line that, by this clock, arrived too early.
 
-        The lines are early by at most ``LATE_S``, and their board times agree (``AGREE_S``).
+        The lines are early by at most ``LATE_S``. Their board times agree with each other
+        (``AGREE_S``).
         """
         self._last_s = 0.0
         self.connect()
@@ -191,8 +193,8 @@ class StampedReadings:
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading with the timestamp ``stamp_s``, or ``now`` if ``stamp_s`` is later.
 
-        The timestamps of one kind of reading rise by at least ``SMALLEST_STEP_S``: a timestamp that
-        is too early is raised.
+        If necessary, the timestamp is raised to ``SMALLEST_STEP_S`` after the last timestamp of
+        this kind of reading.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S

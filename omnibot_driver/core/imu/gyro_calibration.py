@@ -2,7 +2,8 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-If no displacements are reported, a steady turn looks like rest, so a large bias is always rejected.
+Without displacements, a steady turn looks like a bias at rest. The driver therefore always rejects
+a large bias.
 """
 
 import math

@@ -82,7 +82,8 @@ class LoisEcuBoard(Board):
     def reset_refusal(self) -> str:
         """Reason why a reset is refused; empty if a reset is allowed.
 
-        In a terminal mode, the board sends no ticks, so a reset could not be confirmed.
+        In a terminal mode, the board passes on the data of a device and sends no ticks, so a reset
+        could not be confirmed.
         """
         return self._ecu.reset_refusal
 
@@ -123,7 +124,7 @@ class LoisEcuBoard(Board):
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return readings that have been held back long enough. Add odometry if it is due."""
+        """Return readings that have been held back long enough, and odometry if it is due."""
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)

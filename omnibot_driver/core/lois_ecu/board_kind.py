@@ -14,7 +14,8 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports after which an odometry report 0x20 shows a board of the manual's kind."""
+"""If at least this number of tick reports came before an odometry report 0x20, the board is of the
+manual's kind."""
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
 count decreases, the driver decides that the board does not count ticks backward."""

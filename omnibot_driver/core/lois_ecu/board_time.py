@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored tick reports. They usually cover five seconds; a clock error of 100 ppm changes
-the delay by 0.5 ms in this time.
+"""Number of stored tick reports. They usually cover five seconds. In this time, a clock error of
+100 ppm changes the measured delay of a report by 0.5 ms.
 """
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
@@ -90,8 +90,8 @@ class BoardTime:
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
         """Return the delay of a tick report in s by the fitted clock, and whether it is irregular.
 
-        A late read does not explain an irregular delay. Without a known unit, or with too few
-        stored reports, return 0 and False. This report is not stored.
+        A delay is irregular if a late read does not explain it. If the unit of the board's clock is
+        unknown, or too few reports are stored, return 0 and False. This report is not stored.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

@@ -68,8 +68,8 @@ DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""Standard deviation, in m, of the error in a wheel's distance after 1 m without counted ticks:
-``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
+"""Standard deviation, in m, of the error in a wheel's distance after 1 m without counted ticks.
+``SWINGING_M`` is for an oscillating speed, ``BLIND_M`` for a steady speed."""
 SWERVED_M: Final = 0.05
 """Standard deviation, in m, of the errors of the robot's x and y after a wheel has rolled 1 m.
 
@@ -272,7 +272,7 @@ class Comparison:
             speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Correct the filter's wheel speeds towards zero: the board's odometry shows no tick.
+        """Correct the filter's wheel speeds towards zero after a report of odometry without a tick.
 
         ``ticks``: standard deviation of a wheel's distance since the last report, in ticks.
         """

@@ -29,8 +29,8 @@ def twist_variances(
 ) -> tuple[float, float]:
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
-    ``coasting_mps``: standard deviation of each wheel's speed while coasting; negative if the
-    wheel turns backward, because the errors of both wheels are correlated.
+    ``coasting_mps``: for each wheel, standard deviation of its speed while coasting, with the sign
+    of its direction. The errors of both wheels are correlated, so their signs matter.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

@@ -33,8 +33,8 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s that ends a group with as many lines as a complete report. The board sends the lines
-of a group 1.2 ms apart.
+"""Silence in s after which a group ends if it has as many lines as a complete report. The board
+sends the lines of a group 1.2 ms apart.
 """
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75

@@ -30,7 +30,8 @@ FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
 """Growth of the error variance of the board's odometry (0x20), in squared ticks per s.
 
-The variance grows while a wheel is faster than ``FAST_TICKS_PER_S``.
+The variance grows while a wheel is faster than ``FAST_TICKS_PER_S``, because the board then misses
+ticks.
 """
 
 

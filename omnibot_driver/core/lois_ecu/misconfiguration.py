@@ -44,7 +44,7 @@ NO_TICKS_ADVICE: Final = (
 )
 """Advice if other reports came for ``NO_TICKS_S`` (in s), but no ticks.
 
-In this time, each interval between two reports counts as at most ``LONGEST_STEP_S`` (in s).
+A pause between two reports adds at most ``LONGEST_STEP_S`` (in s) to this time.
 """
 LOOK_AT: Final = 600
 """Number of received bytes without a valid line after which the user gets advice. The board sends

@@ -79,8 +79,8 @@ class MotionFilter:
         self.differing_mps = math.inf
         """Smallest estimated difference (m/s) of measured wheel speeds since the last comparison.
 
-        The board's distance, which is compared with the estimate, may be too short, because the
-        public firmware does not update its position at equal speeds.
+        The comparison uses the board's distance. While both speeds are equal, the public firmware
+        does not update its position, so this distance may be too short.
         """
         self.speed_errors = SpeedErrors(self)
         self.history = FilterHistory(self.filter)
@@ -196,9 +196,9 @@ class MotionFilter:
             self.filter.disturb([(state, 1.0)], stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return how wrong each state is if a wheel's estimated distance is wrong by 1 m.
+        """Return the error of each state of the filter if a wheel's distance is wrong by 1 m.
 
-        States that are not wrong are left out.
+        States without an error are left out.
         """
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = self._way_terms(index)

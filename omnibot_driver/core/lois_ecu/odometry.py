@@ -54,8 +54,8 @@ class LoisOdometry:
         self._estimated = False
         """Whether an estimate has been made since the odometry's time last advanced.
 
-        If so, the next advance resets each wheel's flag ``blind`` (motion without counted ticks).
-        An odometry report in the same read may still need this flag.
+        If so, the wheels' flags ``blind`` (motion without counted ticks) are reset when the time
+        next advances. Until then, an odometry report in the same read may need the flags.
         """
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
@@ -145,10 +145,10 @@ class LoisOdometry:
         self._comparison.begin_counts()
 
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
-        """Return whether a restart of the board is the only explanation for counts near zero.
+        """Return whether only a restart of the board explains that the new counts are near zero.
 
-        For a robot at rest, a push may also explain counts above ``NUDGED_TURNS``. ``late_s``: how
-        much later than usual the ticks arrived.
+        If the robot is at rest, and a new count is above ``NUDGED_TURNS``, a push may also explain
+        the new counts. ``late_s``: how much later than usual the ticks arrived.
         """
         found, per_turn = self._unforeseen(ticks, now, late_s), self._settings.ticks_per_revolution
         most = max(NUDGED_TURNS * per_turn, 1)

@@ -69,7 +69,7 @@ longer than a boot (2 s)."""
 UNANSWERED_S: Final = 5.0
 """Time in s without the requested GPS date after which the driver restores the normal mode.
 
-The board may send other reports, but too few tick reports to start further settings rounds.
+The driver does this even if the board sends other reports.
 """
 RESYNC: Final = b"::"
 """Two extra colons between a line with a checksum and a line without.
@@ -264,10 +264,10 @@ class SettingsWriter:
         return b"".join(map(self._encoded, found))
 
     def _encoded(self, command: Command) -> bytes:
-        """Return the line of ``command``, with a checksum if the user's setting says so.
+        """Return ``command`` as bytes, with a checksum if the user's setting says so.
 
-        * A terminal mode may be sent in two lines, with and without a checksum, before a Stop.
         * Stop never has a checksum.
+        * A terminal mode may be sent twice, with and without a checksum. A Stop may follow.
         """
         # If two zeros of a Stop with a checksum were lost, the board would read the checksum as a
         # duty.

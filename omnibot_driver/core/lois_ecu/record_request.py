@@ -83,7 +83,7 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return ``found`` with the result of the request, if known, and without other records.
+        """Return ``found`` with the request's result, if known. Unrequested records are removed.
 
         While lines of a record arrive, return a RecordComes instead of an empty list.
 

@@ -24,8 +24,7 @@ After a boot, the report period is 0.4 s, so one unchanged report is enough.
 class RepeatedReset:
     """A reset of the board with which ``ecu`` converses. It is sent at most ``RESETS`` times.
 
-    * ``left``: how many times the reset can still be sent; ``RESETS`` from ``begin`` until the
-      reset is first sent.
+    * ``left``: how many times the reset can still be sent; ``begin`` sets it to ``RESETS``.
     * ``again_at_s``: time in s at which to call ``again``; infinity if no repetition is planned.
     """
 

@@ -80,9 +80,7 @@ class ReportedSpeed:
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Pass the wheel's estimated speed to the estimator ``resting``.
-
-        The caller calls this method if the board has not reported the wheel's speed.
+        """Pass the wheel's estimated speed to ``resting``, because the board has reported no speed.
 
         ``duration_s``: for how long the board has reported no speed, in s.
         """

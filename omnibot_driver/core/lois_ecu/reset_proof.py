@@ -21,8 +21,9 @@ JUMP_TICKS: Final = 3
 zero that proves a reset. No wheel can roll as far between a reset and the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""``STEADY_TURNS`` (turns of a wheel) plus ``STEADY_TICKS`` (ticks): smallest count at rest from
-which a fall of both counts to zero proves a reset. Backlash changes a count by less."""
+"""``STEADY_TURNS`` (turns of a wheel) plus ``STEADY_TICKS`` (ticks): smallest count at rest that
+can prove a reset. If both counts then fall to zero, the board was reset, because backlash changes a
+count by less."""
 UNPROVED_S: Final = 2.5
 """Time in s after which the driver accepts counts near zero without a proof. No proof is possible
 if the counts were already near zero before the reset."""
@@ -45,8 +46,9 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the driver sends the reset again.
 
-        ``before``: the last tick counts. They replace the earlier ones only if the wheels are at
-        rest (``steady``), and one count is large enough for a proof.
+        ``before``: the last tick counts. They are kept for the proof if the wheels are at rest
+        (``steady``) and one count is large enough. Otherwise, the counts from before an earlier
+        reset are kept.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

@@ -45,8 +45,8 @@ GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Probabilities that a wheel is at rest, by the number of repetitions of its reported speed.
 
-The last value also holds for more repetitions. ``tell`` selects one tuple. ``FASTER`` is assumed;
-the others were counted on the public firmware.
+The last value also holds for more repetitions. Each tuple is for one situation. ``FASTER`` is
+assumed. The values in the other tuples were counted on the public firmware.
 """
 
 
@@ -70,7 +70,7 @@ class RestingWheel:
         self._gaps = False
         """Whether reports were being lost when the reported speed last changed.
 
-        The value is always False if the user has set the controller's gains.
+        If the user has set the controller's gains, lost reports are ignored: the value is False.
         """
         self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0

@@ -102,7 +102,7 @@ def _writes(settings: LoisEcuSettings, *, ticks: bool, correction: bool) -> Iter
 def _repeating(commands: Iterable[Command], settings: LoisEcuSettings) -> Iterator[Command]:
     """Yield ``commands``. A command for a long period of the tick reports is yielded twice.
 
-    The board may lose a line, and a long period is written in fewer rounds than other settings.
+    The board may lose a line, and the driver writes a long period less often than other settings.
     """
     for command in commands:
         yield command

@@ -58,7 +58,7 @@ class SpeedErrors:
         """Reset the bias of each wheel whose kind of command has changed.
 
         A change also resets both wheels' excess, the relative error of a backward speed. A Stop
-        after a duty command changes neither the kind nor the speed's error.
+        after a duty command is not a change.
         """
         before = self._kinds or ("", "")
         left, right = [

@@ -36,15 +36,15 @@ FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
 """Smallest number of reports without motion that show a stalled wheel. ``AT_LEAST`` is for a
-forward command. A backward command needs more: the board may repeat the speed of a rolling
-wheel."""
+forward command. A backward command needs more: the board may repeat the speed of a rolling wheel,
+and such a report does not show motion."""
 
 
 class StallWatch:
     """Detector of stalled wheels. ``stalled`` reports a stalled wheel once in each ``STALLED_S``.
 
-    ``may_roll``: for each wheel, whether it may roll although it seems stalled, because the board
-    repeats a speed that is too high for a wheel at rest.
+    ``may_roll``: for each wheel, whether it may roll although it seems stalled. This is so if the
+    board repeats a speed that is too high for a wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

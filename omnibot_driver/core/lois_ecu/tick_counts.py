@@ -24,10 +24,10 @@ from omnibot_driver.core.lois_ecu.plausibility import (
 RESTARTED_TURNS: Final = 0.3
 RESTARTED_TICKS: Final = 2
 RESTARTED_TURNS_PER_S: Final = 1.0
-"""Largest plausible decrease of a wheel's count in ``duration`` s without a restart of the board.
+"""Part of the largest plausible decrease of a wheel's count without a restart of the board.
 
-The decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, plus
-``RESTARTED_TICKS`` ticks.
+In ``duration`` s, this decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns,
+plus ``RESTARTED_TICKS`` ticks.
 """
 SILENT_S: Final = 1.0
 """Shortest silence in s after which low counts and a deviating clock prove a restart of the board.
@@ -37,8 +37,8 @@ After a shorter silence, a third proof is needed: the expected motion cannot exp
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which wheels are assumed to have rolled back before a tick report that
-contradicts the known unit of the board's clock."""
+"""Longest time in s for which wheels are assumed to roll back between two tick reports. The limit
+holds if the second report contradicts the known unit of the board's clock."""
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may be older than a reset.
 
@@ -164,7 +164,8 @@ class TickCounts:
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
         """Return the time in s since the board's start, by the board's clock, or None if unknown.
 
-        The caller assumes that the board has started since the previous report, ``duration_s`` ago.
+        The caller assumes that the board has started since the previous report, which came
+        ``duration_s`` ago.
         """
         if self.unit is None:
             return None

@@ -40,8 +40,9 @@ class WheelModel:
     """The commands of one wheel. Speeds are those of the wheel's rim.
 
     * ``kind``, ``target_mps``: the command that the motor follows now.
-    * ``hidden_mps``: the RPM target that the firmware keeps, also while a duty is set. A negative
-      duty makes a zero target negative. Ticks are counted only while the target is positive.
+    * ``hidden_mps``: the RPM target that the firmware keeps, also while a duty is set. If this
+      target is zero, a negative duty makes it negative. Ticks are counted only while this target is
+      positive.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:

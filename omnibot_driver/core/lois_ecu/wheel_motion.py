@@ -63,8 +63,8 @@ class Step:
     """One step of the filter over ``dt`` s.
 
     * ``new``: means of the states after the step.
-    * ``unsure_mps``: standard deviation of the last measured speed of a wheel, by the index of the
-      wheel's first state.
+    * ``unsure_mps``: for each wheel, standard deviation of its last measured speed. The key is the
+      index of the wheel's first state.
     * ``rows``: the rows of the transition matrix that differ from the identity matrix, by the index
       of the state.
     * ``noises``: independent errors of the step. Each has a list of the states that it changes,
@@ -83,7 +83,7 @@ class Wheel:
 
     * ``base``: index of the wheel's first state in the filter.
     * ``blind``: whether the wheel moved, or was to move, while the board did not count its ticks.
-      Only the caller sets it to False.
+      The caller resets it to False.
     """
 
     def __init__(self, base: int) -> None:

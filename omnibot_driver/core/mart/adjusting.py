@@ -26,8 +26,8 @@ WAG_S, WAG_UNITS = 0.2, 2
 
 SUPERVISED_S: Final = 1.0
 """Longest time in s in a backward drive (B) without an answer to a change of the motors' units.
-Then ``CS 0 0`` shows whether the server still supervises the motors: a restarted server lets them
-run on."""
+After this time, the driver sends ``CS 0 0`` to find out whether the server still supervises the
+motors: a restarted server lets the motors run on."""
 STARTED_M: Final = 0.01
 """Distance in m after which it is certain that the current units are enough to turn the motors."""
 

@@ -219,8 +219,8 @@ class Conversation(LateReplies):
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` seems to be a copy of the reply to another command.
 
-        True if the pending command, ``word``, is a query whose last reply differs from ``reply``,
-        and an equal reply has just come to another query or to a controlled move.
+        True if the pending command, ``word``, is a query, ``reply`` differs from the last reply to
+        this query, and ``reply`` equals a recent reply to another query or to a controlled move.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

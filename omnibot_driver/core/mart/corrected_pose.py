@@ -77,7 +77,7 @@ class CorrectedPose:
         return True
 
     def run_before(self, is_straight: bool, amount: float) -> None:
-        """Add the unmeasured first run of a controlled move that the robot has made twice.
+        """Add the first of two runs of a controlled move. Only the second run was measured.
 
         ``amount``: the expected distance of a complete run in m, or its expected turn in rad.
         """

@@ -43,8 +43,8 @@ class DrivenWheel:
     def error(self, less: int, seconds: float, per_unit_mps: float) -> float:
         """Return measured minus expected speed, averaged over ``seconds``, in nominal units.
 
-        ``less``: assumed minus real units of the motor, which differ after a lost command.
-        ``per_unit_mps``: speed in m/s of an ideal motor with one unit.
+        ``less``: by how many units the motor's real units are below the assumed ones, after a lost
+        command. ``per_unit_mps``: speed in m/s of an ideal motor with one unit.
         """
         expected = self.line.speed(self.window_units_s / seconds - less)
         return self.window_m / seconds / per_unit_mps - max(0.0, expected)

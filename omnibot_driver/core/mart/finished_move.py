@@ -36,13 +36,14 @@ class Done:
     """A controlled move that has ended, with its measurements.
 
     * ``way_m``, ``turned_rad``: distance and turn by the encoder. If the move had a second run,
-      they are those of the second run alone.
+      both values are for the second run alone.
     * ``lasted_s``: time in s from the request to the reply.
     * ``quiet_s``: longest possible duration of a second run, in s.
     * ``completed``: whether the server reported success, and no stop ended the move.
     * ``expected``: distance in m, or turn in rad, of a complete run, learned from earlier moves.
     * ``stopped_again``: whether the driver has sent a stop after the move, against a second run.
-    * ``slowness``: usual time per inch or degree, relative to a robot with the default settings.
+    * ``slowness``: usual time per inch or degree, divided by that of a robot with the default
+      settings.
     * ``gyro_scale``: true turn divided by the turn that the server's gyro measures.
     """
 
@@ -126,8 +127,8 @@ class Done:
     def has_run_twice(self) -> bool:
         """Whether the measurements show that the server has run the move twice.
 
-        The encoder counts from zero in a second run. So too small a count of a completed move shows
-        a second run that was stopped.
+        The encoder counts from zero in a second run. If the count of a completed move is too small,
+        a second run was stopped.
         """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
@@ -144,7 +145,7 @@ class Done:
     def lags(self) -> bool:
         """Whether an incomplete move went much less far than a move usually goes in this time.
 
-        The encoder may then show only the second run of a duplicated request.
+        The request may then have been duplicated, and the encoder may show only the second run.
         """
         driven_s = self.lasted_s - 2 * SETTLES_S
         least = LEAST_PACE * self.asked * driven_s / (self.usual_s - SETTLES_S)

@@ -81,7 +81,7 @@ class Surplus:
     def degrees(self, wanted: float, *, slow: bool) -> int:
         """Return the degrees to request, so that the robot turns by ``wanted`` degrees.
 
-        The result is 0 if the heading error would become smaller by WORTH_DEG or less.
+        The result is 0 if the turn would reduce the heading error by ``WORTH_DEG`` or less.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
@@ -90,8 +90,8 @@ class Surplus:
     def is_known(self, request: Request) -> bool:
         """Return whether the driver knows how far a complete move of this kind goes.
 
-        Turns are known, because the server ends them by its gyro. Straight moves must be measured
-        first.
+        The result is True for turns, because the server ends turns by its gyro. Straight moves must
+        be measured first.
         """
         return request.word in (MCR, MCL) or (b"SLOW" in request.data.split()) in self._learned
 
