@@ -126,7 +126,8 @@ class Infrared:
 class WheelConfiguration:
     """``conf``: wheel radii, gear, encoder ticks per revolution, track, and control period.
 
-    ``digits``: for each number, the value of one step of its last digit; empty if unknown.
+    ``digits``: for each number, the value of its last decimal place (0.01 for 1.23); empty if
+    unknown.
     """
 
     left_radius_m: float
@@ -157,7 +158,8 @@ class SteeringConfiguration:
     """Line ``confs``: the track, and the distance from the axle to the steered wheel, in m.
 
     * ``first_m``, ``second_m``: these two lengths in the line's order, which depends on the board.
-    * ``digits``: for each number, the value of one step of its last digit; empty if unknown.
+    * ``digits``: for each number, the value of its last decimal place (0.01 for 1.23); empty if
+      unknown.
     """
 
     first_m: float

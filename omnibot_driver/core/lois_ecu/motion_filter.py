@@ -47,9 +47,9 @@ LATE_PART: Final = 0.6
 """Assumed standard deviation of the time at which a command takes effect, as a fraction of the
 speed controller's period."""
 ROLLS_S: Final = 0.1
-"""Standard deviation, in s, of the time that a wheel rolls on after an RPM set-point cuts power.
+"""Standard deviation of the time in s that a wheel rolls on after its controller was reset.
 
-Motors and friction are unknown.
+An RPM set-point can reset the controller, which cuts the power. Motors and friction are unknown.
 """
 REVERSES_S: Final = 0.2
 """Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign. The
