@@ -193,7 +193,7 @@ class Keeper:
     def _tell(self, kind: str, trouble: str) -> None:
         """Report the first trouble of each kind.
 
-        A failed start must be reported even after the report of a guard that died.
+        A guard that died is one kind; a guard that could not be started is another.
         """
         if kind not in self._told:
             self._told.add(kind)

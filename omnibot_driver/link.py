@@ -149,8 +149,8 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        A lost port is opened once more to send Stop. Returns whether this call sent Stop and ended
-        the threads.
+        A lost port is opened once more to send Stop. Return True if this call ended the threads and
+        Stop was sent.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:

@@ -37,8 +37,8 @@ RAW_DEPTH: Final = 1000
 every byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
-"""Time of a simulated clock, in ns, from which on measurements are not published. A stamp may be
-later than the clock, so this is a minute before the latest time that a ROS stamp can have."""
+"""Time of a simulated clock, in ns, from which on measurements are not published. It is a minute
+before the latest possible ROS stamp, because a stamp may be later than the clock."""
 
 
 class Publishing:

@@ -58,8 +58,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the link wrote its last Stop to every line. Always False if the port was reopened
-        for this Stop, and no stop was owed (``Shutdown.owed``)."""
+        """Whether the link wrote its last Stop to every line. If the port was reopened for this
+        Stop, True only if the proof of a stop was still missing (``Shutdown.owed``)."""
         self.stood = False
         """Whether the robot was known to stand still when the link ended. Stop was written to every
         line, and measurements showed the robot at rest after the last motion command."""
@@ -95,14 +95,14 @@ class SharedSession:
     ) -> None:
         """Call ``action`` with the session, the commanded motion ``wish``, and the time in s.
 
-        * ``sent_ns``: possible times of sending, as times of day in ns: one time, two if the
-          sender's clock is uncertain, or none for a command to stop.
+        * ``sent_ns``: possible times of sending, as times of day in ns: two if the sender's clock
+          is uncertain, none for a command to stop, otherwise one.
         * ``moves_base``: whether the command moves the base, so that the motion interlock records a
           refusal.
 
         Raises CommandRefused if ``action`` does, or if the command may have been sent before or
-        during a recent stall. The constructor's ``refused`` receives the reason, unless the queue
-        of events is full.
+        during a recent stall. The constructor's function ``refused`` receives the reason, unless
+        the queue of events is full.
         """
         try:
             with self.lock:

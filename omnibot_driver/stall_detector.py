@@ -14,8 +14,8 @@ STANDSTILL_S: Final = 0.4
 """Duration, in s, from which a pause between calls of ``StallDetector.passed`` is a stall. This
 limit must be shorter than the guard's."""
 SETTLE_S: Final = 0.25
-"""Time in s after a stall in which the driver still refuses commands, because the sender's clock is
-known only roughly."""
+"""Time in s after a stall in which the driver still refuses commands. The sender's clock is known
+only roughly, so these commands may have been sent during the stall."""
 LATEST_S: Final = 10.0
 """Longest assumed time in s from the sending of a command to its arrival, retransmissions included.
 A stamp that is older comes from a wrong clock."""

@@ -19,10 +19,10 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, between two late messages of a series.
+"""Longest pause, in s, within a series of late messages.
 
-After a series that lasts ``HEALS_AFTER_S`` (s), the driver estimates the offset of the sender's
-clock anew.
+If the series lasts ``HEALS_AFTER_S`` (s), the driver estimates the offset of the sender's clock
+anew.
 """
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
@@ -35,7 +35,8 @@ NTP can shift a clock gradually by ``LARGEST_CORRECTION_S`` (s) in addition, but
 a larger error.
 """
 CLOCK_RETREATS: Final = 10.0
-"""Weight of an early arrival in the choice of a message's sender. A late arrival has weight 1."""
+"""Factor by which a message that is early by a sender's clock fits this sender worse than a late
+one. The driver assigns each message to the sender that it fits best."""
 ALIKE_S: Final = 0.02
 """Largest difference, in s, between the misfits of two senders that fit a message equally well.
 

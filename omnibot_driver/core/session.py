@@ -225,10 +225,10 @@ class Session:
         self._command(self._commanding.pose(goal), now)
 
     def end_goal(self, now: float) -> None:
-        """End a drive to a goal or a docking after a zero ``cmd_vel`` was refused.
+        """End a drive to a goal, or a docking, because ``cmd_vel`` commanded zero velocity.
 
-        No ``cmd_vel_timeout`` would end these motions. A commanded velocity stays in effect,
-        because it may be newer than the refused command.
+        The command was refused, but no ``cmd_vel_timeout`` would end these motions. A commanded
+        velocity stays in effect, because it may be newer.
         """
         self._reporter.notify(self._commanding.end_goal(now))
 

@@ -98,8 +98,8 @@ class Several:
         """Return bytes that were received on one line.
 
         Raises LinesChanged if a line was lost or reopened. Raises LinkError if all lines are
-        missing, or if another program uses the line whose path sorts first, which has never been
-        open.
+        missing, or if another program uses the leading line (first path in alphabetical order)
+        before the driver has opened it.
         """
         if not self._ready:
             if not self._changed:  # the guard process may still have a copy of a line just lost

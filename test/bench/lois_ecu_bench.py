@@ -85,9 +85,9 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return figures that compare the driver with a minimal program (the floor), and no table rows.
+    """Return figures that compare the driver with a minimal program (the floor), and an empty list.
 
-    The second value is an empty list, because only some boards have additional rows in the report.
+    The list is for additional rows in the report, which only some boards have.
     """
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:

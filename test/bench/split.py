@@ -30,8 +30,7 @@ within: list[float] = []
 def timed(owner: type, name: str, stage: str) -> None:
     """Replace a method by one that also measures its processor time in the reader's thread.
 
-    The time is added to the total of ``stage``, without the time of the measured methods that the
-    method calls.
+    The time is added to the total of ``stage``. Calls of other measured methods are not included.
     """
     method: Callable[..., Any] = getattr(owner, name)
 

@@ -2,9 +2,8 @@
 
 """Programs that relay a board's data, each with one task more than the previous one.
 
-Each program has more tasks than the floor (the smallest program with the driver's output), and
-fewer than the driver. Arguments: a key of STEPS, the port, the namespace. Nothing is written to the
-port.
+Even the last program has fewer tasks than the driver. Arguments: a key of STEPS, the port, the
+namespace. Nothing is written to the port.
 """
 
 import os

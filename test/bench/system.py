@@ -121,10 +121,10 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return table rows with the costs of floor, relays and driver, relative to those of the floor.
+    """Return table rows with each program's costs relative to the floor, from floor to driver.
 
-    The floor is the smallest program with the driver's output. Each relay has one more task than
-    the relay before.
+    The floor is the smallest program with the driver's output. Each program after the floor, a
+    relay, has one more task.
     """
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:

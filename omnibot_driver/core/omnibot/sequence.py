@@ -3,8 +3,8 @@
 """The counters of the board's deltas and poses. They show lost deltas and a restart of the board.
 
 The counter SEQ of the deltas has one byte and wraps every 10.24 s at 25 Hz. The arrival times show
-how often it has wrapped. The poses have a counter of their own. From pose to pose, the board sends
-a fixed number of deltas, so a pose can show lost deltas before the next delta arrives.
+how often it has wrapped. The poses have a counter of their own. The board sends a fixed number of
+deltas between two poses, so a pose also shows how many deltas were lost.
 
 Input: counters and arrival times; this module does not know what a frame contains.
 """
@@ -21,12 +21,14 @@ WRAP: Final = 256
 LATE_S: Final = 0.5
 """Limit, in s, for the difference between measured and counted time from delta to delta.
 
-Beyond it plus the drift (``DRIFT``), the board may have restarted. Keep it above 0.24 s, the
-largest error of an arrival time.
+Beyond this limit plus the drift (``DRIFT``), the board may have restarted. Keep the limit above
+0.24 s, the largest error of an arrival time.
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and of times that are computed from its counters.
-After minutes of silence, only the board's pose can therefore prove a restart."""
+
+After minutes of silence, this error can hide a restart; only the board's pose then shows it.
+"""
 EARLY_S: Final = 0.2
 """Tolerance, in s, for the time since the last delta, within which a counter must have reached its
 value. If the last delta was read late, this time seems too short."""
@@ -80,11 +82,11 @@ class Sequence:
         """Whether the counters at the last pose have two explanations: a restart of the board in
         the gap before this pose, or a loss of all deltas in this gap."""
         self._may_be_new = False
-        """Whether the board may have restarted in a gap since the last pose. If so, deltas were
-        lost in the gap, and the count after the gap is low enough for a restart."""
+        """Whether the board may have restarted in a gap since the last pose. True if deltas were
+        lost in the gap, and the counter after the gap is low enough for a restart from zero."""
         self._left: tuple[int, float, int] | None = None
-        """What is needed to withdraw a supposed restart: the last counter before it, the arrival
-        time of this counter in s, and the first counter after the restart."""
+        """Data to undo an assumed restart, else None: the last counter before the restart, its
+        arrival time in s, and the first counter after the restart."""
 
     def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.

@@ -20,17 +20,17 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-The blocks must cover more than 20 s: behind an adapter, the smallest delay may occur only every
-20 s (clock error: 100 ppm).
+The blocks must cover more than 20 s: with clocks that differ by 100 ppm, an adapter's smallest
+delay may occur only every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm plus a margin
 of 20 ppm."""
 SUPPORT: Final = 0.75
-"""Selects the edge of a convex hull that serves as the fitted clock.
+"""Selects the edge of the upper bounds' convex hull that serves as the fitted clock.
 
-The hull is used if the fit uses only upper bounds of tick times. A larger value (0 to 1) selects a
-later edge, which follows recent points more closely, with more jitter.
+The hull is used if the fit uses no lower bounds. A larger value (0 to 1) selects a later edge,
+which follows recent points more closely, with more jitter.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -40,8 +40,9 @@ LATE_PART: Final = 0.1
 ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest distance between upper and lower bound of a block's tick times, in periods. Beyond it,
-the lower bound is not used. An adapter's 16 ms timer causes a distance below 0.2 (2 ms)."""
+"""Largest distance, in periods, between the upper and the lower bound from ``BLOCK_TICKS`` ticks.
+Beyond it, the lower bound is not used. An adapter's 16 ms timer causes a distance below 0.2 (2 ms).
+"""
 
 Point = tuple[int, float]
 """The number of a tick, and an upper or lower bound of its time, in s."""
@@ -88,7 +89,7 @@ class ClockFit:
     def not_before(self, earliest: Point) -> None:
         """Add a lower bound of a tick's time.
 
-        ``earliest``: number of the tick, and a time in s by which the tick had not arrived.
+        ``earliest``: number of the tick, and a time in s at which the tick had not yet arrived.
         """
         self._not_before.append(earliest)
 

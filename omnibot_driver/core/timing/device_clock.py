@@ -32,8 +32,8 @@ BEAT_READS: Final = 12
 """Number of consecutive reads that certainly include a read with little delay. An adapter with a
 timer of 16 ms reads at five phases of a 10 ms tick; 12 reads contain each phase twice."""
 CALM: Final = 0.45
-"""Largest distance of the last two reads from the fitted clock, in periods, for the fast path
-(``DeviceClock.stamp``). Keep the value below 0.5: half-way between two ticks, a read's tick is
+"""Limit of the fast path (``DeviceClock.stamp``): largest distance, in periods, of the last two
+reads from the fitted clock. Keep the value below 0.5: half-way between two ticks, a read's tick is
 uncertain."""
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period.
@@ -85,11 +85,8 @@ class DeviceClock:
         """Number of the next tick, and the earliest time in s at which this tick's sample can be
         complete."""
         self._cut_off: Point | None = None
-        """The sample that the last read cut off; None if no sample was cut off.
-
-        The pair: number of the sample's tick, and the earliest time in s at which the sample can be
-        complete.
-        """
+        """Tick number of the sample that the last read cut off, and the earliest time in s at which
+        this sample can be complete. None if no sample was cut off."""
 
     @property
     def skew_ppm(self) -> float:
@@ -203,7 +200,7 @@ class DeviceClock:
         """Compare the newest arrival with the fitted clock, and correct the tick count.
 
         Return the correction in ticks, positive after lost ticks. ``counted``: whether this read
-        contains a displacement, whose tick number is then corrected, too.
+        contains a displacement. If so, the displacement's tick number is corrected, too.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:

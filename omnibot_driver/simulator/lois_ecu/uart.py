@@ -52,7 +52,7 @@ class Uart:
         self._inbound.extend(data)
 
     def say(self, data: bytes, *, deaf: bool) -> None:
-        """Queue data to be sent. ``deaf``: whether interrupts are off while it is sent."""
+        """Queue data to be sent. ``deaf``: whether interrupts are off while the data is sent."""
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:

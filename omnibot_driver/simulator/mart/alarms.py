@@ -24,7 +24,7 @@ _TIMED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR)
 def stop_motors(server: "MartServer", motion: Motion) -> None:
     """Write the value for stop to both motor registers.
 
-    Afterwards, ``sample`` waits until the right wheel is at rest.
+    Later calls of ``sample`` wait until the right wheel (with the encoder) is at rest.
     """
     if motion.kind is Kind.REFERENCE and (
         motion.left < motions.FAST_REGISTER or motion.right < motions.FAST_REGISTER

@@ -171,7 +171,8 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` when ``post`` reports the next start or end of a motion of ``kind``.
 
-        An earlier report counts if no command has used it. ``port``: the waiting command's port.
+        If ``post`` has kept a report, ``then`` is called at once. ``port``: the waiting command's
+        port.
         """
         motion = self.motions[kind]
         if motion.posts:

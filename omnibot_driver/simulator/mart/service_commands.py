@@ -35,7 +35,8 @@ It returns the reply, or None if the reply comes later or never.
 def missing(server: "MartServer", what: str) -> str | None:
     """Refuse a command that has too few numbers.
 
-    With the quirk ``crashes_on_missing_numbers``, the server ends instead, for the reason ``what``.
+    With the quirk ``crashes_on_missing_numbers``, the server ends instead. ``what``: the cause,
+    which the simulator records.
     """
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"

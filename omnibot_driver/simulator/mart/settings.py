@@ -45,8 +45,8 @@ class Quirks:
       it has only one of them, ENC.
     * ``heading_in_reference_moves_only``: the heading of RMRA changes in RM only.
     * ``probe_turns``: MCR 0 runs the motors until the wheel moves; with a dead IMU, for 0.5 s.
-    * ``heading_starts_off``: the first sample of RM adds half the turn rate times the time since
-      the previous RM to the heading of RMRA.
+    * ``heading_starts_off``: at the first sample of RM, the heading of RMRA grows by half the turn
+      rate times the time since the previous RM.
     * ``corrects_after_stop``: TF, TB, PTF, MCF and MCB may correct the heading even in the sample
       in which they stop by themselves. This leaves one motor on, usually with one unit.
     """

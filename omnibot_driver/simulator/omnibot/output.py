@@ -28,7 +28,7 @@ class Output:
         self._ticks_to_text = self._number = 0
 
     def text(self) -> list[bytes]:
-        """Return the text to send in this tick of a pause; an empty list if no text is due."""
+        """Return the texts to send in this tick of a pause: one text, or none."""
         due = self._ticks_to_text == 0
         self._ticks_to_text = (self._ticks_to_text or TICKS_PER_TEXT) - 1
         if not due:

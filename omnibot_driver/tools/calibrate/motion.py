@@ -54,7 +54,7 @@ class Bounds:
     * ``seconds``: longest duration.
     * ``acceleration``, ``angular_acceleration``: in m/s² and rad/s²; infinity: no ramp.
 
-    For ``wheel_cmd``, ``speed`` and ``acceleration`` are those of a wheel, in rad/s and rad/s².
+    For ``wheel_cmd``, ``speed`` and ``acceleration`` are those of a wheel, in rad/s and rad/s², and
     ``turning`` has no effect.
     """
 

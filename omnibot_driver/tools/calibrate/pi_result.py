@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The result of ``calibrate step`` with recorded ticks, for the table, the file and the picture."""
+"""The result of ``calibrate step`` with recorded ticks: printed table, saved file and picture."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 REST_S: Final = 2.0
 ACCELERATION: Final = 1.0
-"""Acceleration of linear commands, in m/s². For turns, twice this number is used, in rad/s²."""
+"""Acceleration of linear commands, in m/s². The acceleration of turns, in rad/s², is twice this
+number."""
 GYRO_TOLERANCE: Final = 0.03
 """Relative tolerance of the gyro's scale: MPU-6050 product specification, section 6.1."""
 UNLIKE: Final = 4.0

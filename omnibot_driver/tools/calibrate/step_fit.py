@@ -67,8 +67,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: a function from the ends of the deltas, in ticks after a unit step, to the model's
-        mean rates.
+        ``mean``: function that returns the model's mean rates after a unit step, for deltas that
+        end at the given ticks.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Receives ``cmd_vel`` from any node, and publishes the commands of a dead man's switch."""
+"""Receives ``cmd_vel`` from any node, and publishes commands while keys are pressed."""
 
 import time
 from collections.abc import Callable
@@ -28,7 +28,7 @@ class VelocityTopic:
 
     ``heard``: function that is called with each command on the topic.
 
-    ``dead_man``: the switch whose commands are published; None: no command is published.
+    ``dead_man``: converts pressed keys to the published commands; None: no command is published.
     """
 
     def __init__(

@@ -28,7 +28,7 @@ With fewer messages on one side, the change of the delay is not regarded as last
 class ClockStep:
     """A step (sudden change) of a clock during the recording.
 
-    * ``by_s``: how much the difference (arrival time minus timestamp) changed at the step.
+    * ``by_s``: change, at the step, of the messages' delay (arrival time minus timestamp).
     * ``after_s``: time from the first message to the step.
     * ``recorders``: True if the recorder's clock stepped, False if the driver's clock stepped.
     """

@@ -80,7 +80,7 @@ def wheel_name(joint: str) -> str:
 def shown(log: Log) -> list[Pair]:
     """Return what to draw: pairs of commands and measurements.
 
-    If the log has no commands, the only pair has the measurements of odom.
+    If the log has no commands, the only pair consists of the measurements of odom alone.
     """
     return pairs(log) or [twists(log)]
 

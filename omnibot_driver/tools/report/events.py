@@ -16,9 +16,9 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s from the begin of a log's last state. If /diagnostics still shows the state after this
-time, the driver was running. If not, a last state "disconnected" means that the driver had ended.
-"""
+"""Time in s after the start of a log's last state. If /diagnostics shows the state even later, this
+proves that the driver was running. Without this proof, a last state "disconnected" means that the
+driver had ended."""
 
 
 def judge(log: Log) -> Iterator[Finding]:

@@ -207,8 +207,8 @@ def _sustained(times_s: Array, rows: Mask) -> list[Span]:
 def _without_slow_starts(stalls: list[Span], moves_s: Array) -> list[Span]:
     """Return the standstills in ``stalls`` that last at least ``SLOW_START_S`` (s).
 
-    The lengths of standstills are added if the robot does not move between them. ``moves_s``: times
-    in s at which the robot moves as commanded.
+    Standstills without motion between them count as one. ``moves_s``: times in s at which the robot
+    moves as commanded.
     """
     groups = groupby(stalls, key=lambda stall: int(np.searchsorted(moves_s, stall.begin_s)))
     together = [list(group) for _, group in groups]

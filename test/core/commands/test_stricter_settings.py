@@ -28,9 +28,9 @@ DRIVES = Bench.drive, (0.4,)
 def test_what_was_commanded_under_looser_ones_ends(
     command: Callable[..., None], values: tuple[float, ...], changed: dict[str, object]
 ) -> None:
-    """If a limit or the timeout becomes stricter while the robot drives, the driver sends Stop.
+    """The user lowers a limit or the timeout while the robot drives. The driver sends Stop.
 
-    It accepts the next command.
+    The driver accepts the next command.
     """
     bench = driving()
     command(bench, *values)

@@ -27,7 +27,7 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether the text of an angle to the right (negative) may contain a 6.
+    """Return whether an angle is to the right (negative), and its text may contain a 6.
 
     The checksum can miss damage to such a text. The result is True within 0.5° of −60° to −69°, and
     of −6°, −16°, −26° and so on.

@@ -154,7 +154,7 @@ class Outcome:
     given: list[tuple[int, int]]
     false: list[tuple[int, int]]
     excused: list[tuple[int, int]]
-    """The false pairs that cannot be recognized, because nothing in the stream shows the error."""
+    """The false pairs of gyro and acceleration that nothing in the stream shows to be false."""
 
 
 def outcome(reads: list[Read]) -> Outcome:
@@ -300,7 +300,7 @@ def test_no_pair_has_lines_of_two_samples(
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
     """No sample after a silence of the drive board gets a stamp from before the silence.
 
-    Samples that arrive before the first pose after the silence have no known time, and are not
+    After the silence, sampling times are unknown until the first pose. Until then, no sample is
     published.
     """
     bench = nominal()

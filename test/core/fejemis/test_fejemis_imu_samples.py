@@ -22,7 +22,7 @@ from omnibot_driver.simulator.fejemis import Firmware
 
 
 def sampled(arrivals: list[float]) -> list[float]:
-    """Return the sampling times of IMU samples that arrive at these times, in s.
+    """Return the driver's sampling times for IMU samples with these arrival times, all in s.
 
     The board takes a sample every 10 ms, and a pose every 20 ms.
     """
@@ -46,10 +46,9 @@ def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken
 
 
 def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
-    """Two samples arrive 17 ms late, as if one were lost.
+    """Two samples arrive 17 ms late, as if one were lost. The next one arrives only 7 ms late.
 
-    The next arrives only 7 ms late, which is impossible after a loss, so the driver shifts no later
-    sampling time.
+    After a loss, it would seem at least 10 ms late, so no later sampling time is shifted.
     """
     late_s = {200: 0.017, 201: 0.017, 202: 0.007}
     arrivals = [0.01 * number + late_s.get(number, 3e-4) for number in range(600)]

@@ -179,9 +179,9 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line loses its end and runs into the next line, and a later line has a wrong checksum.
+    """A line loses its end and runs into the next. A good line and one with a wrong sum follow.
 
-    Each is counted as one fault, and the good line between them is decoded.
+    The driver counts two faults, and decodes the good line.
     """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"

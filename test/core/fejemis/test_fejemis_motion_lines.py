@@ -31,9 +31,10 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
-    """Return the numbers of each command that a lenient board with checksums reads from the bytes.
+    """Return the numbers of each command that a board with checksums may read from the bytes.
 
-    Numbers are read as in C, missing numbers are 0, and a checksum may have one digit.
+    The board is lenient: it reads numbers as in C, missing numbers as 0, and checksums of one
+    digit.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):

@@ -54,7 +54,7 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 @pytest.mark.parametrize("closes", [False, True])
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
-    """After a request to power off, the boards become silent. Then the user calls ~/start.
+    """The user requests a power off, and the boards become silent. Then the user calls ~/start.
 
     The power off fails, and ~/start is not confirmed. ``closes``: whether the ports close right
     after the call of ~/start.

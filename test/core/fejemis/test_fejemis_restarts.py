@@ -226,7 +226,10 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """Only a heartbeat that was sent after a silence proves that the board has not restarted."""
+    """The front board is silent, and may have restarted. An old heartbeat arrives late.
+
+    Only a heartbeat that was sent after the silence ends the driver's uncertainty.
+    """
     bench = nominal()
     bench.run(2.0)
     half, front = bench.board._ports.halves[FRONT], bench.robot.front

@@ -68,9 +68,9 @@ def test_the_biases_are_subtracted_from_both_imu_topics() -> None:
 
 @pytest.mark.slow
 def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
-    """The first orientations after a reconnect have the turn rate of the robot at rest.
+    """A robot turns at 1 rad/s, and the driver disconnects. The robot rests at the reconnect.
 
-    The robot turned at 1 rad/s before.
+    The first orientations after the reconnect have a turn rate near zero.
     """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)

@@ -96,10 +96,10 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.5])
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
-    """The driver stalls, then reads late twice. The published samples have their sampling times.
+    """The driver stalls, and the terminal's full buffer loses bytes. Then a second read is late.
 
-    The terminal's full buffer loses bytes in the stall. Only a sample between the lost bytes and
-    the next pose is not published.
+    The published samples have their sampling times. Only a sample before the next pose is not
+    published.
     """
     bench = nominal()
     bench.run(1.0)

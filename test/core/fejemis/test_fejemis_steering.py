@@ -253,10 +253,10 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 
 
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
-    """The motion monitor has stopped the robot twice.
+    """The user sends a reverse command, and then sets ``allow_reverse``. The robot stays at rest.
 
-    The user commands a reverse motion, and only then sets ``allow_reverse``. The robot stays at
-    rest, and the next reverse command is refused until ~/start.
+    The motion monitor had stopped the robot twice, so the next reverse command is refused until
+    ~/start.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

@@ -91,7 +91,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
     """The clock notices that a board has restarted soon after its start.
 
-    The board's time falls by only 0.6 s, as if the new lines were late.
+    The board's time falls by only 0.6 s, so the new lines could also be late lines.
     """
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))

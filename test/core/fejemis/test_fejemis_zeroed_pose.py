@@ -55,7 +55,7 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_while_the_robot_brakes_hardly_moves_the_odometry() -> None:
     """The board's pose is set to zero while the robot brakes, and the next wheel speeds are lost.
 
-    The odometry is right within 4 mm, because the poses show all later motion.
+    The odometry is still right within 4 mm, because the poses contain the motion since then.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
@@ -126,8 +126,7 @@ def test_a_pose_set_to_zero_three_times_at_once_does_not_move_the_odometry() -> 
 def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
     """The driver reads every 0.15 s, and another program sets the board's pose to zero.
 
-    ``odom`` does not jump. Regression: the last wheel speeds before the pose seemed too old to be
-    used.
+    ``odom`` does not jump. Regression: the driver regarded the last wheel speeds as too old.
     """
     bench = nominal()
     bench.drive_on(0.5, 0.3, 0.6)

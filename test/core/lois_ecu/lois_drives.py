@@ -19,7 +19,7 @@ from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, Si
 STOP = (0.0, 0.0)
 USUAL_PERIODS_MS = {Stream.TICKS: 200, Stream.ODOMETRY: 200}
 """Periods of the reports in ms that the benches set, as docs/boards/lois_ecu.md recommends. If a
-user sets no periods, the board keeps its own, 400 ms. ``test_lois_own_periods.py`` tests these."""
+user sets no periods, the board keeps its own period of 400 ms (``test_lois_own_periods.py``)."""
 HOST_GAINS = LoisEcuSettings(
     low_pass=0.1,
     written={

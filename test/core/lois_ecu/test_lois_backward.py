@@ -38,9 +38,9 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 
 def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
-    """The covariance fits the error of the pose, also with the gains that the board boots with.
+    """With the boot's gains, the right wheel stops, but the board still reports a speed for it.
 
-    With these gains, the right wheel stops, but the board still reports a speed for it.
+    This makes the pose wrong. The covariance fits the error.
     """
     ours = LoisEcuSettings()
     names = {1000: "place right", 1003: "straight back", 1004: "curve back", 1001: "place right"}

@@ -13,9 +13,9 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 
 @pytest.mark.parametrize("lost", [0.0, 0.067], ids=["goes on", "stands while it sends"])
 def test_a_read_that_is_late_is_told(lost: float) -> None:
-    """If a read is 40 ms late, its estimated delay is 40 ms.
+    """A read is 40 ms late. The driver estimates this delay correctly, within 3 ms.
 
-    This is also true if the board's clock stops whenever the board sends.
+    This is also true for a board whose clock stops while it sends.
     """
     board = BoardTime()
     found = []

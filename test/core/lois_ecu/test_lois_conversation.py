@@ -117,8 +117,8 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """A robot whose user has switched the checksums off can be driven.
 
-    The driver restores the left "short correction", which the command for lines without checksums
-    (0x11, value 4) overwrites.
+    The driver restores the setting LEFT_SHORT_CORRECTION, which the command for lines without
+    checksums (0x11, value 4) overwrites.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver._upkeep.writer.confirmed:
@@ -137,8 +137,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.
 
-    After a backward drive, the ticks prove nothing on the public firmware, which counts no ticks in
-    such a drive.
+    The public firmware counts no ticks backward, so its ticks prove nothing after a backward drive.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -177,7 +176,7 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 @pytest.mark.slow
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """After a Stop without RPM 0/0, a slower set-point than before does not start the wheels.
+    """If a drive ends with Stop, but without RPM 0/0, a slower set-point does not start the wheels.
 
     The firmware's controller still uses the higher speed that it measured last, and gives no power.
     """

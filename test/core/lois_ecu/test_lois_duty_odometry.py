@@ -57,7 +57,7 @@ def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_sc
 
 @pytest.mark.parametrize("own_periods", [False, True])
 def test_a_report_just_after_a_stop_does_not_take_the_drive_back(*, own_periods: bool) -> None:
-    """A report that arrives while the wheels roll out after a duty drive does not undo the drive.
+    """A report arrives while the wheels roll out after a duty drive. The driven distance is kept.
 
     Regression: half of the distance disappeared from the odometry.
     """

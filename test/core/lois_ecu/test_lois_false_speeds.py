@@ -111,7 +111,7 @@ def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
 
 
 def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
-    """After a change from forward to backward, reported speeds show how far the wheels roll out.
+    """The set-point changes to backward. Reported speeds show how far the wheels roll forward.
 
     The board reports these speeds with the sign of the new set-point.
     """

@@ -156,9 +156,9 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 
 @pytest.mark.parametrize("with_sum", [True, False])
 def test_a_recovery_that_waited_for_a_stop_follows_it_after_a_pause(with_sum: bool) -> None:
-    """No GPS date arrives in a long drive, so the driver must restore the board's mode.
+    """In a long drive, the board does not answer, and seems to have left its normal mode.
 
-    The driver writes the mode 15 ms after the Stop, and writes no setting with it.
+    The driver waits for the Stop, and 15 ms later writes only the lines that restore the mode.
     """
     settings = LoisEcuSettings(with_sum=with_sum)
     points = SetPoints(settings)

@@ -296,7 +296,7 @@ def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
 def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: float) -> None:
     """A restart at rest during a stall does not change the pose.
 
-    The clock in ns wraps every 4.3 s, so only the arrival times show this restart.
+    The board's clock jumps back every 4.3 s anyway, so only the arrival times show this restart.
     """
     bench = Bench("documented")
     for _ in range(14):

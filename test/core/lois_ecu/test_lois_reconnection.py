@@ -88,7 +88,10 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
 
 
 def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_motion() -> None:
-    """Counts that a reset clears while the wheels roll out are not taken for backward motion."""
+    """The driver resets the board while the wheels roll out, and the tick counts fall from 5 to 3.
+
+    The driver does not take this fall for backward motion.
+    """
     translation = Translation(LoisEcuSettings())
     translation.reset()
     translation.readings([Ticks(1000, 5, 5)], [10.0], "ms", 10.0)

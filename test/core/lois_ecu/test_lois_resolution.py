@@ -133,7 +133,7 @@ def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
 def test_a_wheel_that_rolls_back_proves_no_reset(
     per_turn: int, before_turns: float, after_turns: float
 ) -> None:
-    """A small count does not prove a reset if the wheel had rolled forward by at most one turn.
+    """A count that falls from at most one turn to nearly zero does not prove a reset of the board.
 
     The wheel may have rolled back.
     """

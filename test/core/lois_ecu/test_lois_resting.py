@@ -82,7 +82,7 @@ def test_one_tick_that_came_late_is_not_a_fall() -> None:
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
     """Three repetitions of a speed below 4.5 or above 23.5 RPM do not show rest.
 
-    The board repeats a stopped wheel's last speed, which is rarely such a speed.
+    The board repeats a stopped wheel's last speed, which is rarely so low or so high.
     """
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
@@ -98,8 +98,8 @@ def test_another_speed_ends_the_rest() -> None:
 def test_a_fall_that_was_not_told_is_seen() -> None:
     """The driver estimates 28 RPM for a wheel, and then the board reports 14 RPM three times.
 
-    After this fall, the repeated speed proves the wheel's rest: the board repeats the last speed of
-    a stopped wheel.
+    The fall and the repetitions prove that the wheel is at rest: the board repeats the last speed
+    of a stopped wheel.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):

@@ -166,7 +166,7 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
     """A wheel at rest whose last reported speed is below its set-point does not look stalled.
 
-    The controller uses this speed, so it gives power, and the wheel starts by itself.
+    The board's controller regards this speed as too low, and gives power until the wheel starts.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -196,7 +196,8 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 ) -> None:
     """The board always reports the same high speed of a wheel, which may roll or be at rest.
 
-    The driver sends RPM 0/0 to start a wheel at rest, but keeps the driven distance.
+    The driver sends RPM 0/0, so that a wheel at rest can start. The odometry keeps the distance of
+    a wheel that rolled.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

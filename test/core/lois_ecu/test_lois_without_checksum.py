@@ -78,7 +78,7 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
 def test_a_board_that_expects_checksums_unnoticed_drives_again_after_a_rest(firmware: str) -> None:
     """A board that works without checksums begins to expect them, and its wheels do not start.
 
-    While the robot rests, the driver also writes the mode line with a checksum. The next drive
+    While the robot rests, a line with a checksum switches the checksums off again. The next drive
     succeeds.
     """
     bench = Bench(firmware, LoisEcuSettings(with_sum=False))

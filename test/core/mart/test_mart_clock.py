@@ -59,8 +59,8 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
     """Before the first drive, the driver sets the server's clock (UTC) without waiting.
 
-    The command TIME may then set the clock back. After a drive, this does harm, so the driver sends
-    TIME only as a minute ends.
+    The clock may then be set back. After a drive, this does harm, so TIME is sent only as a minute
+    ends.
     """
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 

@@ -205,7 +205,7 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     """The log can still be downloaded after the reply to a stop was lost.
 
-    "No motion" in reply to the repeated stop could mean a restart, but the heading is not zero.
+    The reply "no motion" to the repeated stop shows no restart, because the heading is not zero.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success

@@ -167,7 +167,7 @@ def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
 def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
     firmware: Firmware, lost_way: str
 ) -> None:
-    """After an unanswered change of the motors' units, the driver soon corrects the turn rate.
+    """The driver changes the motors' speeds, and gets no reply. It soon corrects the turn rate.
 
     The measured speeds show whether the change has arrived.
     """
