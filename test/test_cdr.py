@@ -122,9 +122,9 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
-    """The check at start accepts the driver's own serializer for frame names of any length.
+    """At start, the driver's serializer passes its check with frame names of any length.
 
-    The length matters, because it decides how the numbers after the name are aligned.
+    The length of a name decides how the numbers after the name are aligned.
     """
     values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""

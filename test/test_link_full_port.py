@@ -81,10 +81,9 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
     full: bool, terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A link ends without a proof of rest.
+    """A link ends without a proof of rest. If the port is full, the guard discards the old data.
 
-    The guard discards the old data in a full port. In a port that is not full, the guard keeps the
-    link's last packets.
+    Otherwise, the port has accepted the link's last packets, and the guard keeps these packets.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

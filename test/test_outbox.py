@@ -93,7 +93,7 @@ def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed:
 
 
 def test_nobody_claims_what_is_not_next() -> None:
-    """``claim`` gives the right to deliver only if no other thread delivers and no event waits."""
+    """``claim`` allows a direct delivery only if no event waits and no other thread delivers."""
     outbox = Outbox()
     held = Held(outbox)
     assert not outbox.claim()

@@ -77,7 +77,7 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """The topic of one line selects a robot. All lines of this robot are replayed.
+    """A user chooses the topic of one line in a bag. All lines of the same robot are replayed.
 
     The bytes of each line reach the channel of this line.
     """

@@ -108,9 +108,9 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """A command that seems to be sent 1 ms after the end of a stall is refused.
+    """A command is refused if its stamp is 1 ms after the end of a stall.
 
-    The driver knows the sender's clock only roughly.
+    The sender's clock is known only roughly, so the command may be from the time of the stall.
     """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Byte streams of the simulated board, and functions that divide them into frames or decode them.
+"""Byte streams of the simulated board, and functions that evaluate the streams.
 
-The manual's tables divide a stream into frames. The driver's decoder decodes it.
+Some functions divide a stream into frames by the manual's tables. Other functions use the driver's
+decoder.
 """
 
 import struct

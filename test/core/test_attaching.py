@@ -48,9 +48,9 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
     lost: tuple[int, ...], turn: float, frame: str
 ) -> None:
-    """The driver starts while the robot moves, and displacements are lost before two poses agree.
+    """The driver starts while the robot moves, and loses displacements until two poses agree.
 
-    The odometry keeps the interpolated motion, and agrees with all later poses.
+    The odometry keeps its estimate of the lost motion, and agrees with all later poses.
     """
     odometry, trip, missing, estimates = Odometry(SETTINGS), Trip(0.7), 0, []
     for number in range(60):
@@ -67,9 +67,9 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
 
 
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
-    """A pose has damaged values and a damaged count, so the next pose seems to show a restart.
+    """A damaged pose puts an error into odom. The next pose seems to show a restart.
 
-    This next pose lies where the odometry expects it, and removes the error from odom.
+    This next pose lies where the odometry expects it, and removes the error.
     """
     odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
     for number in range(30):

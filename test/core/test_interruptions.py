@@ -90,8 +90,8 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
     """A paused board restarts at rest. No frame arrives until the board has run for 4 s.
 
-    The first delta that arrives has a higher count than the last delta before the pause. Odom does
-    not move to the new origin.
+    The first delta then has a higher count than the last one before the pause. Odom stays where it
+    was.
     """
     on = line(0, frame=frame)
     on.drives = False

@@ -55,9 +55,9 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A robot is at rest when a long task begins, and is later driven and stopped.
+    """A robot is at rest when a long task begins. The task continues when the robot is driven.
 
-    Only this stop makes the task fail, and the message says that the robot was stopped.
+    When the robot is then stopped, the task fails. The message says that the robot was stopped.
     """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)

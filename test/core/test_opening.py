@@ -130,9 +130,9 @@ def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: b
 
 @pytest.mark.parametrize("waits", [ImuFrame((0, 0, -16384), (0, 0, -1)), DeltaFrame(7, 0, 0, 255)])
 def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: Frame) -> None:
-    """A frame that the decoder holds when the board falls silent is never published.
+    """The decoder holds a frame whose last byte may begin another frame.
 
-    The decoder holds it because its last byte may begin another frame.
+    If the board then falls silent, this frame is never published.
     """
     bench, rest = Bench(), encode(REST)
     bench.open()

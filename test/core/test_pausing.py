@@ -52,9 +52,9 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """If another program has just paused the board, the driver sends no P on a request for a pause.
+    """Another program pauses the board. Then the driver gets a request for a pause.
 
-    The driver sends P only after new data, and a paused board sends none.
+    The driver sends no P, because P would start the paused board again.
     """
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"

@@ -210,9 +210,11 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test how the robot stops if the line loses bytes on the way to the board.
 
-        ``number_of_life``: index of a pair of stops in ``LIVES``. Each driver performs both stops.
+        For each seed in ``numbers``, a new driver performs all stops of one group.
 
-        ``numbers``: one seed for each driver, for the board's settings and the losses.
+        ``number_of_life``: index of the group in ``LIVES``.
+
+        ``numbers``: seeds for the board's settings and the losses.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

@@ -16,12 +16,11 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Let the adapter hold back the bytes to the board, and then deliver all of them at once.
+    """Let the adapter hold back all bytes to the board until 1 s after the last command.
 
-    After the delivery, the robot must be at rest.
+    When the adapter delivers the bytes, the robot must be at rest.
 
-    ``seconds``: time for which commands continue while the adapter holds bytes. The delivery is 1 s
-    later.
+    ``seconds``: time in s for which commands continue while the adapter holds bytes.
 
     ``mute``: whether the driver gets no data from the board until the delivery.
     """

@@ -47,9 +47,9 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_are_pursued_by_what_was_sent(goals: GoalRig) -> None:
-    """The tests of this module share one driver.
+    """In all tests of this module, the driver has published only readings that the board sent.
 
-    Up to here, the driver has published only readings that the board sent.
+    The tests share one driver.
     """
     goals.judge_stream()
     assert not goals.findings.take(), goals.driver.output

@@ -85,9 +85,9 @@ def read(
     most: Callable[[], int],
     delay_s: Callable[[Random, float], float] = delay_s,
 ) -> Chunks:
-    """Return the chunks that a late reader makes of the bytes that arrive in ``pieces``.
+    """Return the reads of a late reader, to which an adapter delivers the bytes in ``pieces``.
 
-    ``most``: returns the largest number of bytes that the next read may take.
+    ``most``: function that returns the largest number of bytes of the next read.
     """
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []
@@ -116,7 +116,9 @@ def few_bytes_straddling(received: Received, random: Random) -> Chunks:
 
 
 def all_at_once(pieces: Chunker) -> Chunker:
-    """Return a chunker of late reads. Each read gets all bytes that have arrived.
+    """Return a function that divides a stream into the reads of a late reader.
+
+    Each read gets all bytes that have arrived.
 
     ``pieces``: how the adapter delivers the bytes.
     """
@@ -190,7 +192,7 @@ READERS: dict[str, Chunker] = {
     "all mixed": mixed,
 }
 BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
-"""Chunkings for a computer with busy loops, which delay both the adapter and the reader.
+"""Ways to divide a stream into reads while busy loops delay the adapter and the reader.
 
-The times of the reader's reads hardly show when the bytes arrived.
+The times of the reads hardly show when the bytes arrived.
 """

@@ -13,15 +13,15 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Largest number of intact true frames that the judge skips without further evidence.
+"""Largest number of intact sent frames that the judge skips to find a decoded frame.
 
-After a larger skip, a true frame may equal the decoded frame by chance. The next decoded frame of
-the read (if any) must then confirm the match.
+After a larger skip, the frames may be equal by chance. So the next decoded frame of the read (if
+any) must also be found.
 """
 REACH_BYTES = 600
-"""The search for the frames of a read begins this number of received bytes before the read.
+"""Number of received bytes before a read in which the judge searches for the read's frames.
 
-In the sent stream, the search begins another 300 bytes earlier.
+In the sent stream, the judge goes back another 300 bytes.
 """
 
 

@@ -44,9 +44,9 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return a variant of this course, in which the board reports ``shown`` from ``tick`` on.
+        """Return the driver's writes if the board reports ``shown`` from ``tick`` on.
 
-        The states before ``tick`` stay the same.
+        Before ``tick``, the board reports the states of this course.
 
         ``shown``: the mode of the board, and whether the robot moves.
         """

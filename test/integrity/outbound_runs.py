@@ -43,7 +43,7 @@ The report has no limits for their results.
 ESTOPS: Final = ("e-stop", "goal", "exit")
 """Scenes in which it matters whether the board obeys an emergency stop."""
 BOOTS: Final = ("reset", "exit")
-"""Scenes in which bytes that arrive during the boot can wake the board up."""
+"""Scenes in which the board boots, and may count bytes that arrive then as wake-up bytes."""
 
 RECEIVERS: Final = {
     f"{framing.replace('_', ' ')}, letters {letters}": (framing, letters)

@@ -143,7 +143,8 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
     """The judge accepts a letter (S, P or R) that the driver sent, and counts all others.
 
-    A byte of a frame counts as "false", and a letter that the line added counts as "added".
+    A byte that the driver did not send as a letter counts as "false". A letter that the line added
+    counts as "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)

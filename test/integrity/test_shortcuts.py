@@ -81,10 +81,10 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 
 
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
-    """Return a sample of all combinations of one choice from each list: about one in ``number``.
+    """Return about one in ``number`` of the combinations of ``choices``.
 
-    With three or more lists of at least ``number`` choices each, every pair of choices from two
-    different lists occurs.
+    A combination has one choice from each list. With three or more lists of at least ``number``
+    choices each, every pair of choices from two different lists occurs.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [

@@ -94,7 +94,7 @@ def test_the_default_geometry_is_the_drivers() -> None:
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
     """Wheels that turn at the rates of the driver's kinematics move the body as commanded.
 
-    Only the rolling direction of each wheel is compared: the rollers allow motion across it.
+    Only each wheel's rolling direction is compared, because the rollers allow sideways motion.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

@@ -286,7 +286,7 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
 
 
 def test_the_hook_of_git_has_the_formatter_of_the_tests() -> None:
-    """The hook of pre-commit and ``make lint`` use the same version of ruff."""
+    """The pre-commit hook and ``make lint`` use the same version of ruff."""
     (version,) = re.findall(r"rev: v(\S+)", (ROOT / ".pre-commit-config.yaml").read_text())
     assert f"ruff=={version}\n" in (ROOT / "requirements/test.txt").read_text()
 

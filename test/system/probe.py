@@ -169,9 +169,10 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the probe's newest message again after some seconds, when a stall is over.
+        """Publish the probe's newest message again some seconds later, when any stall is over.
 
-        The wait is longer than ``WARN_EVERY_S``, so that the driver logs a second refusal, too.
+        The wait is longer than ``WARN_EVERY_S``. So if the driver refuses the message again, it
+        logs that.
         """
 
         def publish() -> None:

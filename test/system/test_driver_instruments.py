@@ -245,7 +245,7 @@ def test_measurements_wait_for_simulated_time_and_it_is_said(
 ) -> None:
     """With ``use_sim_time``, the driver publishes measurements only when /clock has a time.
 
-    It also waits for /clock if the board is simulated, although this board runs in real time.
+    This also holds for a simulated board, which runs in real time.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

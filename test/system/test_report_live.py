@@ -17,7 +17,7 @@ from omnibot_driver.tools.report.__main__ import main
 page.PICTURES = [picture for picture in page.PICTURES if picture[0] == "path"]
 sys.exit(main(sys.argv[1:]))
 """
-"""Code that runs the report with only one of its pictures, to save time."""
+"""Python program that runs the report with only one of its pictures, to save time."""
 IN_VAIN = """
 import os, sys
 from omnibot_driver.tools.report import live

@@ -55,8 +55,8 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 ) -> None:
     """The board restarts, or the host stalls, on a line with an FTDI adapter.
 
-    99 % of the stamps have the same error to within ±0.5 ms. The first 2 s of the stream, and the
-    first 2 s after a restart, are left out.
+    The errors of 99 % of the stamps lie within ±0.5 ms of one value. The first 2 s of the stream,
+    and the first 2 s after a restart, are left out.
     """
     stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, skew, 0, 20.0, event)
     assert stamped.unevenness() < 0.2e-3
@@ -66,7 +66,7 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
     """If an FTDI timer cuts no frame in two, all stamps are late by one frame's duration ±0.5 ms.
 
-    Only a cut frame would show the timer's phase more exactly.
+    Without a cut frame, the driver knows the times of the timer only roughly.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within

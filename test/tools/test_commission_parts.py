@@ -314,9 +314,9 @@ def test_the_wrong_frame_turns_with_the_robot(
 ) -> None:
     """Two equal commands, before and after a turn, show whether the assumed delta frame is right.
 
-    * Same direction in the body's axes: right.
-    * Direction changed by the angle of the turn: wrong.
-    * Any other change: ToolError.
+    * The two motions have the same direction in the body's axes: right.
+    * Their directions differ by the angle of the turn: wrong.
+    * Any other difference: ToolError.
     """
 
     def heading(rad: float) -> Drift:

@@ -242,8 +242,8 @@ def beside(drive: Drive, *streams: dict[str, str]) -> Log:
 def test_the_rate_of_another_robot_is_not_expected(drive: Drive) -> None:
     """A bag with an OmniBot and a MART does not show which rate ``odom`` should have.
 
-    The report gives the measured rate only in a note, but expects 100 Hz of the IMU, which
-    only the OmniBot has.
+    The report gives the measured rate of ``odom`` only in a note. Only the OmniBot publishes
+    ``imu/data_raw``, so the report expects 100 Hz there.
     """
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.odom, name, getattr(drive.odom, name)[::2])

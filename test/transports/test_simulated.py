@@ -33,7 +33,7 @@ def stack() -> Iterator[ExitStack]:
 
 
 def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
-    """Read at least ``wanted`` bytes of one channel, and discard the bytes of other channels."""
+    """Read until ``wanted`` bytes of one channel have come. Discard the bytes of other channels."""
     data, deadline_s = b"", time.monotonic() + PATIENCE_S
     while len(data) < wanted:
         assert time.monotonic() < deadline_s, f"only {data!r} came"

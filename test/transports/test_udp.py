@@ -300,8 +300,8 @@ def test_an_answer_is_read_although_the_name_has_another_address(
 def test_a_lookup_that_ends_after_an_answer_is_not_used(names: Names, named: UdpPorts) -> None:
     """A host answers while its name is looked up. Then the lookup finds another address.
 
-    The port ignores this address. It stays open even if the host falls silent again, until a new
-    lookup has ended.
+    The port ignores this address. If the host falls silent again, the port stays open at least
+    until a new lookup has ended.
     """
     names.wait_for(1, named)
     while named._name._looks_up:

@@ -156,7 +156,10 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 
 
 def test_diagnostics_have_the_rate_of_odom() -> None:
-    """The topic /diagnostics has the rate of ``odom`` that the user set, for the report tool."""
+    """The topic /diagnostics contains the rate that the user set for ``odom``.
+
+    The report tool needs this rate.
+    """
     assert MartBench(settings=MartSettings(odom_rate_hz=10.0)).board.figures.odom_hz == 10.0
 
 

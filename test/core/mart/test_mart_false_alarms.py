@@ -114,7 +114,7 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 
 @pytest.mark.slow
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
-    """An obstacle ends a move of a heavy robot early. The driver does not make a later move longer.
+    """An obstacle ends a move of a heavy robot early. The next move is not longer than usual.
 
     The server reports the obstacle only in its reply to the next move.
     """

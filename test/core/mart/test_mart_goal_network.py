@@ -172,9 +172,9 @@ def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
 def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_before(
     word: bytes, later_s: float
 ) -> None:
-    """If the odometry is reset after a move has run twice, the first run is not added to the pose.
+    """A move runs twice. The user resets the odometry before the driver reads the encoder.
 
-    The reset comes before the driver reads the encoder.
+    The pose after the reset contains no motion of the first run.
     """
     bench = on(NetworkFaults(), "source")
     reach(bench, Pose(0.6, 0.0, 0.0))

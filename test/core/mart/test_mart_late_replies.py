@@ -168,9 +168,9 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """A copy of an earlier reply looks like the reply to a start. The next stop is lost.
+    """A copy of an earlier reply looks like the reply to B, which starts a reverse drive.
 
-    The true reply to the start comes after the stop, and does not prove the stop.
+    The driver then sends SM (stop), which is lost. The late reply to B does not prove the stop.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

@@ -129,10 +129,9 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 
 @pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
-    """The server's process stands still for 5 s while the robot rests.
+    """While the robot rests, the server's process stands still for 5 s.
 
-    Afterwards, the driver accepts commands: late replies to queries do not mean that the stop port
-    hangs.
+    The server then answers late, and the driver accepts commands again.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

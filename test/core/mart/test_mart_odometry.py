@@ -88,9 +88,9 @@ def test_the_covariance_of_the_twist_covers_its_error(
 def test_a_drive_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     speed_mps: float,
 ) -> None:
-    """The odometry adds both of two drives that end with equal encoder counts.
+    """Two drives end with equal encoder counts, and only the replies to their stops arrive.
 
-    Only the replies to their stops arrive, so the second drive could seem not to have happened.
+    The odometry adds both drives, although the second could seem not to have happened.
     """
     error = after_equal_motions((speed_mps, 0.0), 0.05).error
     assert error.way_m < 0.05

@@ -63,9 +63,9 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the driver: directly after a stop by the stop port, it sends the stops SRM and SM.
+    """Patch the driver: after SL (stop by the stop port), it at once sends the stops SRM and SM.
 
-    Without the patch, the driver first finds out which motion is in progress.
+    This can hang the server, so the real driver first finds out which motion is in progress.
     """
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 

@@ -194,7 +194,10 @@ def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Fi
 
 
 def test_a_restarted_server_without_mcs_ends_the_motion_by_a_turn_of_one_degree() -> None:
-    """If a restarted server has no MCS, the driver ends the motion by a turn of one degree."""
+    """A server restarts during a move, and its firmware has no MCS (motors off).
+
+    The driver ends the motion by a turn of one degree.
+    """
     bench = rescued("documented", alive=True)
     assert bench.robot.stands
     assert b"MCR SLOW 1" in bench.said()

@@ -42,10 +42,10 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """The server never crashes or hangs, and the robot can be stopped.
+    """The server never crashes or hangs, and the robot can always be stopped.
 
-    Up to two copies and one reply come late, and the IMU may die. With a dead IMU or a lost server,
-    only a crash is forbidden.
+    Up to two copies and one reply come late, and the IMU may die. If the IMU is dead, or the driver
+    has given up the server, only a crash of the server is forbidden.
     """
     found = search()
     assert found.bad == ()
@@ -154,10 +154,12 @@ def compared(server: Server) -> Server:
 
 @pytest.mark.parametrize("word", [*SAID, "the IMU dies"])
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
-    """The model and the simulated firmware agree in every state in which the server answers.
+    """The model of the server agrees with the simulated firmware if the server answers.
 
-    * Busy server: only SL and SS are compared.
-    * After a stop by the stop port (``released``): ``L`` is not compared.
+    These cases are not compared:
+
+    * Busy server: commands other than SL and SS.
+    * After a stop by the stop port (``released``): ``L``.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

@@ -182,8 +182,8 @@ def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
 ) -> None:
     """On a slow network, one change is at most 15 motor units forward, and 5 backward.
 
-    A change that the network delivers twice must be small, above all backward, where the driver may
-    not notice that.
+    The network may deliver a change twice. The driver may not notice this if the robot drives
+    backward.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

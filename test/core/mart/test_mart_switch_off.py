@@ -145,10 +145,9 @@ def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
 def test_a_motion_that_never_began_does_not_replace_a_switch_off(
     word: bytes, twist: tuple[float, float]
 ) -> None:
-    """A motor is left on, and the command that starts the next motion is lost.
+    """A motor is left on, and the next command, which would set both motors' speeds, is lost.
 
-    This motion would have set the speeds of both motors. Instead, the driver switches the motor
-    off.
+    The driver still switches the motor off.
     """
     bench = creeping()
     lost = drops(bench.robot.network[0].to_board, lambda data: data.startswith(word))

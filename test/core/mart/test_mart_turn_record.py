@@ -126,9 +126,9 @@ def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("inequality", [-0.05, 0.05])
 def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequality: float) -> None:
-    """With the recorded angles of turns, all goals are reached although one wheel is 5 % faster.
+    """The robot reaches all goals although one wheel is 5 % faster.
 
-    The server reports no heading.
+    The server reports no heading, so the driver downloads the server's record of each turn.
     """
     bench = MartBench("source", motor_inequality=inequality).ready()
     for goal in GOALS:
@@ -218,9 +218,9 @@ def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes)
 def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
     late_s: float,
 ) -> None:
-    """The network duplicates the driver's download of a turn's record.
+    """The network duplicates the driver's request for the record of a turn.
 
-    Then the user downloads the record of a move. The driver first waits for late replies, so the
+    Then the user requests the record of a move. The driver first waits for late replies, so the
     user gets the right file.
     """
     bench = MartBench("source").ready()

@@ -132,10 +132,9 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A knock drives the sensor to its limit, 2 g.
+    """A knock drives the sensor to its limit, 2 g. The filter passes the reading on at once.
 
-    The filter releases the reading at once, because a single changed bit cannot turn a reading at
-    rest into 2 g.
+    A single changed bit cannot turn a reading at rest into 2 g.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -182,10 +181,9 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement faster than 2 m/s or 8 rad/s is rejected.
+    """A displacement faster than 2 m/s or 8 rad/s is rejected, and counts as lost.
 
-    The next displacement's ``lost`` counts the rejected one, and adds the ``lost`` of both
-    displacements.
+    The next displacement's ``lost`` also includes the ``lost`` of the rejected one.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -248,9 +246,9 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """A displacement is rejected. It reports a restart of the board, and has an unknown duration.
+    """A rejected displacement reports a restart of the board, and has an unknown duration.
 
-    The next displacement reports the restart instead, and its duration becomes unknown.
+    The next displacement then reports the restart, and has an unknown duration, too.
     """
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
@@ -331,10 +329,9 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A sensor sends text, so its full scale is infinite.
+    """A board sends readings as text. The filter passes the reading of a knock on at once.
 
-    The filter releases the reading of a knock at once: damage to a text does not flip a single bit
-    of a value.
+    Damage to a text does not flip a single bit of a value, so the full scale is infinite.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]

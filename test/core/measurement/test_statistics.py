@@ -47,10 +47,9 @@ def test_a_pause_loses_nothing() -> None:
 def test_a_restart_after_a_pause_counts_only_if_lost_deltas_do_not_explain_it(
     restarts: bool,
 ) -> None:
-    """The board restarts, or is paused and started again; the first delta afterwards is lost.
+    """The board restarts, or is only paused and started. The first delta afterwards is lost.
 
-    The driver counts only the restart: a pause and a lost delta explain the next delta's sequence
-    count.
+    The driver counts a restart only if the board has restarted.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

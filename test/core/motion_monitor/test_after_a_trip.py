@@ -75,9 +75,9 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """After a stop by the motion monitor, a sender that does not pause must first command zero.
+    """A sender continues after a stop by the motion monitor, and is refused until it commands zero.
 
-    After a second stop, its motion commands are refused until ~/start is called.
+    After a second stop, the sender's motion commands are refused until ~/start is called.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -126,9 +126,9 @@ def test_a_refusal_that_silence_has_ended_is_not_shown() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """The time in which the driver stalls does not count as silence of the sender.
+    """After a stop by the motion monitor, commands are refused until the sender is silent.
 
-    So a stall does not end the refusal of commands after a stop by the motion monitor.
+    The time in which the driver stalls does not count as silence.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

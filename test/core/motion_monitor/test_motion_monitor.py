@@ -250,7 +250,7 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """While a robot that has obeyed Stop is pushed, the time between faults becomes ever longer.
+    """A robot that has obeyed Stop is pushed. The monitor reports faults at ever longer intervals.
 
     The driver sends Stop for each fault.
     """

@@ -224,9 +224,9 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """A pose that does not end a gap leaves the covariance unchanged.
+    """If no displacement is lost, a pose of the board leaves the covariance unchanged.
 
-    The board computes its pose from the same wheels, so the pose has the same errors.
+    The board computes poses and displacements from the same wheels, with the same errors.
     """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -76,10 +76,9 @@ def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
 
 
 def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
-    """Poses show a speed of 1 m/s. Before them, the last displacement has shown 0.5 m/s.
+    """The last displacement shows 0.5 m/s. Then ten displacements are lost, and only poses arrive.
 
-    Ten displacements are lost, and only poses arrive. Gap interpolation uses the speed of the
-    poses.
+    The poses show 1 m/s. Gap interpolation uses the speed of the poses.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
@@ -92,7 +91,7 @@ def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
 
 
 def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
-    """If a displacement came after the last pose, the next pose does not change the stored motion.
+    """A displacement arrives between two poses. The second pose does not change the stored motion.
 
     The displacement shows the present motion better than the difference of the two poses.
     """
@@ -129,8 +128,7 @@ def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it
 def test_the_uncertainty_of_a_gap_does_not_depend_on_the_poses_in_it_if_they_are_not_used() -> None:
     """Poses within a gap do not change its uncertainty if ``use_board_pose`` is False.
 
-    Fifty displacements are lost. The counters of the poses show this number, but the driver does
-    not use the poses' motion.
+    Fifty displacements are lost. The uncertainty is the same with and without poses among them.
     """
     deviations = []
     for poses in (0, 9):

@@ -91,7 +91,7 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
     """After a gap, no step from one odom message to the next is faster than 2 m/s or 8 rad/s.
 
-    The first step contains the motion of the gap, and covers more time than the gap.
+    The first step contains the motion of the gap and of the next delta.
     """
     for seed in range(5 if lost < 60 else 2):
         _, estimates = over_a_gap(lost, seed, frame)
@@ -174,10 +174,9 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 @pytest.mark.parametrize("use_board_pose", [True, False])
 @pytest.mark.parametrize("phase", range(5))
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
-    """The odometry adds the motion of lost deltas only once.
+    """Deltas are lost. The next pose includes their motion, which the odometry adds.
 
-    A pose ends the gap and includes this motion. Later, the counter of the next delta shows the
-    loss again.
+    Then the counter of the next delta shows the loss. The odometry does not add the motion again.
     """
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the zeros before frames to the board, and of words that could act as commands."""
+"""Tests of the zeros before frames, and of 16-bit words whose bytes could act as commands."""
 
 import re
 

@@ -71,7 +71,8 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 ) -> None:
     """After ``uptime`` deltas and 2.1 s of silence, the board restarts and counts from zero.
 
-    The pose is ambiguous only if both counters (deltas and poses) also fit a loss of frames.
+    The next pose leaves the restart in doubt only if the counters of deltas and poses both fit a
+    mere loss of frames.
     """
     sequence = counted(uptime)
     begun_s = uptime * 0.04 + 2.1
@@ -186,10 +187,10 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """After a restart, a delta and a pose have the counter 0.
+    """After a restart, a delta and then a pose have the counter 0.
 
-    The delta's counter could be damaged, but the pose shows the restart. The driver counts no delta
-    as lost.
+    The delta alone does not prove the restart, but the pose does. The driver counts no delta as
+    lost.
     """
     sequence = Sequence()
     for count in range(171):

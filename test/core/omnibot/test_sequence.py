@@ -58,9 +58,10 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """The first delta after a pause has the count 0, or does not continue the count.
+    """A board that sends poses is paused. The first delta afterwards does not continue the count.
 
-    The driver suspects a restart, because the board sends poses, and the next pose decides.
+    The driver suspects a restart, until the next pose decides. It also suspects a restart if the
+    count is 0.
     """
     sequence = Sequence()
     for number in range(11):
@@ -110,7 +111,7 @@ def test_a_restart_after_a_pause_is_doubtful_if_a_board_that_continued_lost_fewe
 ) -> None:
     """After a pause, the driver assumes a restart if the first delta does not continue the count.
 
-    The restart is doubtful if it would mean more lost deltas than a continued count.
+    The restart is doubtful if fewer deltas would be lost without a restart.
     """
     sequence = begun(before - 10)
     for number in range(11):

@@ -12,9 +12,9 @@ from omnibot_driver.core.requests import Request
 
 
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
-    """If the board is paused at first, the sum of the delays is still a finite number.
+    """The «Paused» text of a board adds nothing to the sum of the delays.
 
-    The «Paused» text has no sampling time, and adds nothing to the sum.
+    The text has no sampling time, so its delay is unknown. The sum stays a finite number.
     """
     bench = Bench()
     bench.open()

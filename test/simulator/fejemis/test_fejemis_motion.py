@@ -99,8 +99,7 @@ def test_no_command_ends_by_itself() -> None:
 def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
     """A robot is commanded to drive a curve in reverse, and turns in the commanded direction.
 
-    In reverse, the firmware variant "mirrored" gives the front wheel the same angle as for driving
-    forward on the same curve.
+    In the firmware variant "mirrored", the front wheel has the same angle in reverse as forward.
     """
     rig = Rig(firmware=Firmware(sums=False, reverse="mirrored")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)

@@ -112,7 +112,7 @@ def reference_start_counts_on(quirks: Quirks) -> bool:
 
 
 def speed_word_first(quirks: Quirks) -> bool:
-    """Return whether the server ignores SLOW after the distance, in TF 24 SLOW."""
+    """Return whether SLOW has no effect in TF 24 SLOW, where it follows the distance."""
     rig, normal = Rig(quirks), Rig(quirks)
     rig.ask("TF 24 SLOW")
     normal.ask("TF 24")

@@ -172,10 +172,10 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """A sonar measures three times if an obstacle is near, so its reply comes later.
+    """A sonar measures three times, and replies later, if an obstacle is within the sonar's limit.
 
-    The front sonar reads 19 inches, and its limit is 19. The rear sonar reads 16 inches, and its
-    limit is 15.
+    The front sonar reads 19 inches, which is its limit. The rear sonar reads 16 inches and measures
+    once, because its limit is 15.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"

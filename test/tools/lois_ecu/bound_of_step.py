@@ -83,10 +83,10 @@ def _covariance(kind: str, ways_s: Column) -> Column:
 
 
 def main(robots: int = 20) -> None:
-    """Print how exactly any fit could find the fast time constant, for each kind of noise.
+    """Print how exactly a fit can at best find the fast time constant, for each kind of noise.
 
-    The printed bound is a relative standard deviation: the median and the greatest value of
-    ``robots`` random robots.
+    The printed values are relative standard deviations: the median and the greatest of ``robots``
+    random robots.
     """
     for kind in ("each time", "other marks", "same marks"):
         found = []

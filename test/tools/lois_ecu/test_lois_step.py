@@ -83,7 +83,7 @@ def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
 
 @pytest.mark.parametrize("slow_s", [0.2, 0.45])
 def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
-    """Misplaced marks change the times between ticks by 10 %.
+    """The encoder's marks are misplaced, which changes the times between ticks by 10 %.
 
     The fit still finds a second-order plant.
     """
@@ -97,7 +97,10 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """The fit finds misplaced marks, which change the times between ticks by 10 %."""
+    """The encoder's marks are misplaced, which changes the times between ticks by 10 %.
+
+    The fit finds the displacements of the marks, and the plant.
+    """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
     assert np.std(found.marks.steps) == pytest.approx(0.1, abs=0.02)
@@ -143,9 +146,9 @@ def test_records_that_are_too_short_are_refused() -> None:
 
 @pytest.mark.parametrize("begins", [0, 1])
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
-    """If short and long ticks alternate, the tool finds a correction factor for each kind.
+    """Short and long ticks alternate, and the board has missed some edges.
 
-    In this test, the board has missed some edges.
+    The tool finds a correction factor for short ticks, and one for long ticks.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
