@@ -33,7 +33,8 @@ board may have been silent.
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.
 
-A «Paused» text proves nothing within this time after a command, or if data follow within this time.
+A «Paused» text does not prove that a command was obeyed if the text comes within this time after
+the command, or if data follow within this time.
 """
 HELD: Final = (
     ", but the e-stop is latched: the robot does not move until you release it with ~/estop"
@@ -261,7 +262,7 @@ class ModeManager:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Confirm a pause, end an overdue request as failed, or repeat the start, if one is due.
+        """Confirm a pause, end an overdue request as failed, or send the start again if it is due.
 
         At most one of these is done.
         """

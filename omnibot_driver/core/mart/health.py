@@ -61,8 +61,8 @@ class Health:
       heading.
     * ``heading_changes``: number of changes of the reported heading in the current motion.
     * ``reference_fails``: number of starts of RM in a row that have failed.
-    * ``outlived``: whether the server's stop port may still wait for the end of an old motion, so
-      that the next motion's stop can fail.
+    * ``outlived``: whether the server's stop port may still wait for the end of an old motion. If
+      so, the next stop can fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -122,9 +122,9 @@ class Health:
         return []
 
     def _is_of_another(self, word: Word, inches: float) -> bool:
-        """Return whether the distance is probably the reply to another query.
+        """Return whether a sonar's distance is probably the reply to another query.
 
-        True if it is 0 inches, or if it equals the last reading of the other sonar.
+        True if ``inches`` is 0, or if it equals the last reading of the other sonar.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)

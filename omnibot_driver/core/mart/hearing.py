@@ -135,7 +135,7 @@ class Hearing(Measuring):
     def _greeted_of_name(self, now: float) -> float:
         """Return the earliest time at which the HELLO that was just answered may have been sent.
 
-        Several HELLOs may be unanswered. Minus infinity if the time is unknown.
+        The answer may be to the oldest unanswered HELLO. Minus infinity if the time is unknown.
         """
         longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self._trip_s)
         recent = [each for each in self._greetings if each >= now - longest_s]

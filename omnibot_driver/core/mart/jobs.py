@@ -66,8 +66,8 @@ WORD_OF: Final[dict[Job, Word]] = {
 WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
 USUAL_S: Final = 20.0
 OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
-"""Jobs that the driver begins by itself. Until the driver has sent the request of such a job,
-another job can replace the driver's job."""
+"""Jobs that the driver begins by itself. Another job can replace such a job until its request has
+been sent."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 """Jobs whose request may be sent again if the reply is missing."""
 COMPARED: Final = frozenset({Job.LAST_MOVE, Job.LAST_TURN})

@@ -44,10 +44,10 @@ class LateReplies:
         self._answers[word] = reply, now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record a late ``reply`` to an earlier request, and stop expecting one of the same form.
+        """Record a late ``reply`` to an earlier request.
 
-        Nothing changes if an equal reply has answered a request in the last ``delay_s``: ``reply``
-        may be a copy.
+        No other late reply of the same form is expected. Nothing changes if ``reply`` may be a
+        copy: an equal reply has answered a request in the last ``delay_s``.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)

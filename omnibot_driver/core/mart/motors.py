@@ -120,9 +120,9 @@ class Motors:
         return equal * self._balance(max(right, left))
 
     def _mean_speed(self, units: float) -> float:
-        """Return the mean speed of both motors when each motor has ``units`` motor units.
+        """Return the mean speed of both motors, in nominal units, at ``units`` motor units.
 
-        The speed is in nominal units, and at least 0.
+        The speed is at least 0.
         """
         return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
 

@@ -207,7 +207,7 @@ class Moves(Asking):
         return self.odometry.turn.spun_rad / self._settings.heading_scale
 
     def _expected(self, move: Request) -> float:
-        """Return the true distance forward in m, or turn to the left in rad, of a complete move."""
+        """Return how far a complete move really goes: forward in m, or to the left in rad."""
         turns = move.word in (words.MCR, words.MCL)
         scale = abs(self._settings.heading_scale) if turns else 1.0
         return scale * self._surplus.expected(move)

@@ -42,8 +42,8 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
-"""Longest time in s, after the last voltage query (VOLTS), for which unanswered requests delay the
-next one. In the first STARTS_UP_S (s) after a motion, the delay may be longer."""
+"""Longest time in s between two voltage queries (VOLTS), if unanswered requests delay the second
+query. In the first STARTS_UP_S (s) after a motion, the time may be longer."""
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
 
@@ -103,8 +103,8 @@ class Pilot(Hearing):
     def busy(self, now: float) -> bool:
         """Return whether the driver expects the server to be silent, because the server is busy.
 
-        The result is False if the server may be lost: outside controlled moves, it was silent for
-        too long (``_absent_s``) before a stop.
+        If the server was silent for more than ``_absent_s`` before a stop, the server may be lost,
+        and the result is False. In a controlled move, such silence is normal.
         """
         if (stopping := self._stopping) is not None:
             silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s
@@ -228,8 +228,8 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        An encoder count after the move excludes this. So does the answer to a later HELLO, at least
-        twice the network delay after the move's start.
+        Two replies exclude a duplicate: an encoder count after the move, and the answer to a later
+        HELLO. The answer must come at least twice the network delay after the move's start.
         """
         # the server would execute a duplicate before it answers
         counted = self.odometry.wheel.from_s >= self._rested_s

@@ -33,9 +33,9 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.REVERSING: DRIVING,
     State.TURNING: TURNING,
 }
-"""Period in s of each query, by state, the most urgent query first.
+"""Period in s of each query, by state. The most urgent query is the first.
 
-In states that are not listed here, the command port is busy: no queries are sent.
+In all other states, the command port is busy, so no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
 """The two sonars, and the least time in s between their queries. After less time, a late copy of

@@ -200,10 +200,10 @@ class Reckoning(CorrectedPose):
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add a heading error, because the moment when the wheel speed ratio changes is uncertain.
+        """Add a heading error, because it is uncertain when the wheel speed ratio changes.
 
-        ``part``: relative change of the ratio. ``late_s``: length in s of the interval in which the
-        change may happen.
+        ``part``: relative change of the ratio. ``late_s``: length in s of the interval that
+        contains the change.
         """
         turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
@@ -279,7 +279,7 @@ class Reckoning(CorrectedPose):
         return self.turn.add(turn_rad)
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """Correct a heading that was computed from commands, when the server has reported the turn.
+        """Correct a heading computed from commands, after the server has reported the turn.
 
         Return the correction in rad, which is not a motion of the robot.
         """

@@ -21,8 +21,8 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 rad/s.
 """
 OLD_RAD: Final = 0.01
-"""Largest difference in rad between two headings that are regarded as the same. The same heading
-before and after RM (forward drive) may come from a late reply or a lost RM."""
+"""Largest difference in rad between two headings that are regarded as the same. If the heading is
+the same after RM (forward drive), it may be old: the reply was late, or RM was lost."""
 MOST_RAD: Final = 1e7
 """Limit in rad. A reported heading of this size or more is rejected.
 

@@ -103,8 +103,8 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which RM (forward) starts both motors.
 
-        The slower wheel determines the units, from LEAST_UNITS to 60. After a start that turned no
-        motor, the units can be higher than the slower wheel needs.
+        The commanded speed of the slower wheel determines the units, from LEAST_UNITS to 60. After
+        a start that turned no motor, the units can be higher.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -118,8 +118,8 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that neither motor turns, because the present motor units are too few.
 
-        ``units``: the units of both motors; None for those last commanded. Nothing is learned from
-        a blocked motor, which has MOST_DEAD units or more.
+        ``units``: the units of both motors; None for those last commanded. With MOST_DEAD units or
+        more, a motor is regarded as blocked, and nothing is learned.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -278,9 +278,9 @@ class SpeedLoop(Motors):
         self._missed = [*self._missed, self._change][-MOST_MISSED:]
 
     def answered_again(self) -> None:
-        """Record that the server may have carried out a change twice, because it answered twice.
+        """Record that the server may have changed the motor units twice, because it answered twice.
 
-        The uncertainty of the wheel speed ratio grows by the largest possible effect of a second
+        The uncertainty of the wheel speed ratio grows by the largest possible effect of the second
         change.
         """
         self._unsure += self._copy**2

@@ -29,8 +29,8 @@ HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for learning from slow turns, as fractions of the commanded rate.
 
 * ``LEAST_LESSON``: lowest rate that the driver learns. It replaces a lower measured rate.
-* ``HELD``: lowest measured rate from which the driver learns, once it has learned from a turn. In a
-  slower turn, something holds the robot.
+* ``HELD``: lowest measured rate from which the driver learns, except in the first turn. In a slower
+  turn, something holds the robot.
 """
 EVEN: Final = 0.15
 """Relative change of the rate during a turn, below which the driver learns from the turn."""
@@ -56,7 +56,7 @@ UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Terms of the largest plausible error of the angle in a stop's reply.
 
 It is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two queries.
-Above it, the number may be an encoder count.
+If the error is larger, the reply may be an encoder count.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.

@@ -34,8 +34,8 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 NAME_WAIT_S: Final = 2.0
 """Longest time in s for which a controlled move waits until all earlier HELLOs have arrived.
 
-After this time, the driver sends the move. Answers to HELLO then do not show whether a copy of the
-move is running.
+After this time, the driver sends the move anyway. Answers to HELLO then cannot show whether a copy
+of the move is running.
 """
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""

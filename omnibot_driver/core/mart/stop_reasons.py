@@ -23,7 +23,7 @@ This time is BLIND_S (s), plus TRIPS times the average duration of an exchange.
 FROZEN_S, FROZEN_TIMES = 0.5, 3
 """Limits for a constant heading. If both are reached, the driver stops the robot.
 
-``FROZEN_S``: time in s, plus twice the average duration of a query.
+``FROZEN_S``: time in s. The driver adds twice the average duration of a query to this limit.
 
 ``FROZEN_TIMES``: number of replies with the same heading.
 """
@@ -44,11 +44,13 @@ moves."""
 BLOCKED_S: Final = 0.6
 """Time in s for which a wheel must stand still in a drive before it is regarded as blocked."""
 STUCK_S, COASTS_S = 0.5, 0.2
-"""Times in s for which the left wheel, which has no encoder, may turn unseen.
+"""Times in s for which the left wheel, which has no encoder, may have turned unseen.
 
-``STUCK_S``: in a robot that does not seem to move.
+This motion makes the odometry less certain.
 
-``COASTS_S``: in a robot that is stopped because a wheel is blocked.
+``STUCK_S``: if the robot did not seem to move.
+
+``COASTS_S``: if the robot was stopped because a wheel was blocked.
 """
 
 

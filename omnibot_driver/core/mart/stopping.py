@@ -74,7 +74,8 @@ class Stopping:
     * ``move``: the controlled move to stop, whose reply ends the stop; None for another motion.
     * ``planned``: whether the motion is stopped without a fault.
     * ``rounds``: number of times that the driver has sent the usual stop commands (``HALTS``).
-    * ``strange``: the failure to report to the user if the stop does not succeed; may be empty.
+    * ``strange``: an unexpected ``fail`` reply, which is shown to the user if the stop does not
+      succeed; may be empty.
     """
 
     def __init__(
@@ -182,10 +183,10 @@ class Stopping:
 
     @property
     def doubtful_result(self) -> Ok | None:
-        """The doubtful reply that is most probably the reply to the stop command, or None.
+        """The most probable reply to the stop command among the doubtful replies, or None.
 
-        The last reply with a plausible number is preferred. The result is None if earlier requests
-        may have caused all doubtful replies.
+        It is the last reply with a plausible number, or else the last reply. None if earlier
+        requests may have caused all doubtful replies.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -45,10 +45,10 @@ class Stops(StopReasons, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: the fault, for a notice; empty without a fault. A fault also discards the user's
-        command, except when the driver already refuses this motion (``_blocked``).
+        ``why``: the fault, for a notice; empty without a fault. If the driver does not refuse this
+        motion yet (``_blocked``), a fault also discards the user's command.
 
-        ``arrived``: whether the server has certainly received the start.
+        ``arrived``: whether the server has certainly received the motion's start command.
         """
         if why:
             # a blocked motion is refused until its command ends

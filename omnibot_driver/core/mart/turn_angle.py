@@ -33,7 +33,7 @@ class TurnAngle:
         self._may_be_recorded = False
 
     def forget(self) -> None:
-        """Reject a later record of the last turn, because the odometry frame was reset.
+        """Reject a record of the last turn that comes later: the odometry frame was reset.
 
         The heading in the new frame does not include that turn.
         """

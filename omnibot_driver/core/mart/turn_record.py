@@ -87,7 +87,7 @@ class TurnRecords:
         return None if again else recorded_deg(pieces, request)
 
     def used(self, told_rad: float, wheel_rad: float) -> None:
-        """Add a recorded turn, which the odometry has used, to the ratio of the motors' speeds.
+        """Learn the ratio of the motors' speeds from a recorded turn that the odometry has used.
 
         ``told_rad``: the recorded angle. ``wheel_rad``: the part that the right wheel has caused;
         with equal motors, half of the turn.

@@ -50,7 +50,8 @@ class WheelCount:
     * ``last``: last accepted count.
     * ``told_s``, ``from_s``: most probable and earliest possible time of the last count.
     * ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
-    * ``maybe``: the last reported count, if it may be older than the motion; else 0.
+    * ``maybe``: the last reported count, if it may date from before the current motion; else 0. It
+      only adds uncertainty.
     """
 
     def __init__(self) -> None:
@@ -161,9 +162,10 @@ class WheelCount:
         return Step(wheel_m, seconds, lost, unsure)
 
     def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
-        """Reject an implausible count and return None, except for the third one in a row.
+        """Reject an implausible count and return None, but accept the third one in a row.
 
-        The result is then ``step``, because three wrong replies in a row are unlikely.
+        Three wrong replies in a row are unlikely. The result is then ``step``, the step to this
+        count.
         """
         self._odd += 1
         if self._odd < ODD_TIMES:

@@ -210,10 +210,9 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading. If it is a pose, add the rejected displacements to its ``lost``.
+        """Return the reading; in a pose, add the number of rejected displacements to ``lost``.
 
-        Like a displacement lost on the line, a rejected one is part of the motion that the pose
-        shows.
+        The pose shows the motion of rejected displacements and of those lost on the line.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading

@@ -29,7 +29,7 @@ class Spikes:
 
     * ``left``: largest remaining change after a spike, as a fraction of the spike.
     * ``knocked``: number of values, from the beginning of the list, that a knock against the robot
-      can change. Unlike a knock, a spike of these values looks like one flipped bit.
+      can change. A change of these values is a spike only if it looks like one flipped bit.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:

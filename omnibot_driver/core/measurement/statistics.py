@@ -23,8 +23,8 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s, for counting lost readings; None if each IMU reading
-      counts them (``lost``).
+    * ``imu_period_s``: period of the IMU in s, for counting lost readings; None if the IMU readings
+      themselves report losses (``lost``).
     """
 
     imu_period_s: float | None = None
@@ -55,7 +55,7 @@ class StreamStatistics:
     _sent_imu: int | None = field(default=None, repr=False)
     """Number of IMU readings that the board had sent before the last displacement; None if unknown.
 
-    Readings during lost displacements are added when a pose shows the loss.
+    When a pose shows lost displacements, the IMU readings of the same time are added.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
     _restarted: bool = field(default=False, repr=False)

@@ -61,8 +61,8 @@ _DIRECTIONS: Final = tuple(
 )
 """Directions in which the distance of a velocity from the hull of allowed velocities is computed.
 
-Between directions, the computed distance is too small by up to 2 % of itself, plus 10 % of the
-hull's length.
+Between two directions, the computed distance is too small: by at most 2 % of the distance, plus
+10 % of the hull's length.
 """
 
 

@@ -223,10 +223,10 @@ class MotionMonitor:
         return fault
 
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
-        """Return the fault of motion that does not fit the commands.
+        """Return the fault of motion that does not fit the commands: wrong direction or too fast.
 
-        Linear motion is too fast within 60° of a set-point's direction or with unknown heading; a
-        turn, in a set-point's direction. Otherwise, the direction is wrong.
+        The direction of linear motion is right within 60° of a set-point's direction, and not
+        checked if the heading is unknown. A turn's direction is right if a set-point has the same.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

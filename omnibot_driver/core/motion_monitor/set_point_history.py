@@ -36,8 +36,8 @@ FADED_S: Final = 1.1
 """Time in s after which the monitor ignores a replaced set-point. By then, the velocity that this
 set-point still allows has decayed to less than 2 %."""
 UNKNOWN_S: Final = 0.8
-"""Time in s, from the first known set-point on, for which the robot may still move because of
-unknown earlier commands."""
+"""Time in s after the first known set-point in which unknown earlier commands may still move the
+robot."""
 HISTORY_S: Final = 3.0
 """Length of the history in s. A displacement can be older than the history only if the computer has
 stalled."""

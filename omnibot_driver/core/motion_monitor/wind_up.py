@@ -91,10 +91,11 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add to the wind-up the distance by which a held robot falls behind its set-point.
+        """Increase the wind-up by the distance that a held robot falls behind its set-point.
 
         * If the robot is not held, the wind-up decays.
-        * ``motion``: measured mean twist during ``seconds``, which the set-points allow.
+        * ``motion``: measured mean twist during ``seconds``. Call this method only if the
+          set-points allow this twist.
         * ``newest``: set-points that the robot may still be approaching, the current one first.
         * ``heading_known``: if False, the direction of the linear velocity is not checked.
         """

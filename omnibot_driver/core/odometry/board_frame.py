@@ -16,8 +16,8 @@ BEGUN_M: Final = 0.005
 BEGUN_RAD: Final = 0.01
 """``BEGUN_M``, ``BEGUN_RAD``: tolerances, in m and rad, of a pose that shows a new board frame.
 
-Such a pose is this near to the pose that is expected if the board began at zero. A pose in the old
-frame is rarely so near.
+The pose must be this near to the pose that is expected if the board has begun at zero. A pose in
+the old frame is rarely so near.
 """
 
 
@@ -69,7 +69,7 @@ class BoardFrame:
         """Return whether the pose ``told`` shows that the board has begun a new frame.
 
         * If ``told`` refutes the suspected restart, the suspicion ends.
-        * ``before``: ``told`` minus the displacements that wait for a pose.
+        * ``before``: the pose before the waiting displacements, computed back from ``told``.
         * ``confirmed``: whether ``told`` agrees with the last unexpected pose of the board.
         * ``reachable``: whether the robot can have reached ``told`` without a restart.
         """

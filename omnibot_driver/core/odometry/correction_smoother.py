@@ -26,7 +26,7 @@ class CorrectionSmoother:
 
     @property
     def wrong(self) -> Pose:
-        """Known error of ``pose``: ``target`` minus ``pose``."""
+        """The correction that ``pose`` still needs: ``target`` minus ``pose``."""
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:

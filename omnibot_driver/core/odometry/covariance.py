@@ -2,8 +2,8 @@
 
 """The uncertainty of the odometry. Its three sources of error are stored separately.
 
-The sources are the wheels, motion in gaps that the board did not report, and corrections that are
-still due. docs/internals/architecture.md explains when the error of each source shrinks.
+The sources are the wheels, gaps in the board's reports, and corrections that are still due.
+docs/internals/architecture.md explains when the error of each source shrinks.
 
 This module knows covariances and the wheels' geometry; it does not know frames or boards.
 """
@@ -148,9 +148,9 @@ class Astray:
     def __init__(self) -> None:
         self.m2 = 0.0
         self._along_m = (0.0, 0.0)
-        """Covariances of x and y with the relative error of the last displacement, in m.
+        """Covariances, in m, of x and y with the relative error of the last displacement.
 
-        The relative error is scaled to variance 1.
+        The relative error has no unit, and is scaled to variance 1.
         """
         self._rad2 = 0.0
 

@@ -100,8 +100,8 @@ class DeadReckoning:
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
         """Add an assumed motion (``tangent``) for a gap in the displacements.
 
-        ``seconds``, ``stamped_s``: duration of the gap in s, by the number of lost displacements
-        and by the stamps. The shorter one limits the published motion.
+        ``seconds``: duration of the gap in s, by the number of lost displacements. ``stamped_s``:
+        duration in s by the stamps. The shorter duration limits the published motion.
         """
         frame = self.frame
         if frame.pose is not None:

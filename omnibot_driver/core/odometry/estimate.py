@@ -36,7 +36,8 @@ class OdometryEstimate:
     """The odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in body axes.
 
     * ``twist``: None if the duration of the displacement is unknown.
-    * ``rolled``: sum of the tangents (twist x time) of all motion so far, in the board's axes.
+    * ``rolled``: sum of all motion so far (twist x time), in the board's axes; it gives the wheel
+      angles.
     * ``rolling``: present rate of change of ``rolled``, a twist in the board's axes; None if
       unknown.
     * ``twist_variances``: linear in m²/s², angular in rad²/s². If None, the values of the

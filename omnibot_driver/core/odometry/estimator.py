@@ -30,8 +30,8 @@ LONGEST_WAIT_S: Final = 1.0
 After this time, the driver assumes the heading of the last, unconfirmed pose; without a pose, 0.
 """
 LONG_GAP_S: Final = 1.0
-"""If displacements are lost for more than this time, in s, the next displacements wait for a pose
-of the board. The pose shows the lost motion."""
+"""Longest gap, in s, after which the next displacements are used at once. After a longer gap, they
+wait for a pose of the board, which shows the lost motion."""
 POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
@@ -62,10 +62,10 @@ class Odometry:
         self.configure(settings)
         self._backlog = PendingDisplacements()
         self._since_gap: Pose | None = None
-        """The pose that the board would report now if it had begun a new coordinate frame in a gap.
+        """The pose that the board would report now if it had begun a new frame in the longest gap.
 
-        The longest gap since the last pose counts. None without a gap, or if the gap began near the
-        origin.
+        Only gaps since the last pose are considered. None without a gap, or if the gap began near
+        the origin.
         """
         self._gap_lost = 0
         """Number of displacements lost in the gap of ``_since_gap``; 0 without such a gap."""
@@ -101,8 +101,9 @@ class Odometry:
     def reset(self, now: float = math.inf) -> list[OdometryEstimate]:
         """Move the odometry frame's origin to the robot's current pose.
 
-        Return the estimates of displacements that waited for a pose. If a gap was mostly before
-        ``now`` (s, by the stamps' clock; by default entirely), its motion is discarded.
+        Return the estimates of displacements that waited for a pose. The motion in a gap is
+        discarded if most of the gap was before ``now``, the time in s by the stamps' clock. By
+        default, ``now`` is infinite: the motion in any gap is discarded.
         """
         self.alignments += 1
         due = []
@@ -206,10 +207,10 @@ class Odometry:
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:
-        """Convert ``place`` from the odometry frame into the board's frame.
+        """Convert the pose ``place`` from the odometry frame into the board's frame.
 
-        The unwrapped heading is the one nearest to the robot's. None without ``use_board_pose``, or
-        while no pose has shown the relation of the frames.
+        The returned heading differs from the robot's heading by half a turn at most. The result is
+        None without ``use_board_pose``, or while no pose has shown the relation of the frames.
         """
         if self._frame.pose is None or self._frame.since_restart is not None or not self._settles:
             return None
@@ -252,7 +253,7 @@ class Odometry:
         )
 
     def _began_in_gap(self, told: Pose, since_gap: Pose) -> bool:
-        """Return whether a pose shows that the board began a new frame in a gap before the pose.
+        """Return whether the pose ``told`` shows that the board began a new frame in a recent gap.
 
         ``since_gap``: the pose that is expected if the board began a new frame.
         """
@@ -283,8 +284,8 @@ class Odometry:
     def _resume(self, told: Pose, lost_s: float) -> list[OdometryEstimate]:
         """Use a pose of the board to compute the motion of lost displacements.
 
-        Return the estimates of displacements that waited for this pose. ``lost_s``: duration of the
-        gap in s, if no displacement has waited.
+        Return the estimates of the later displacements, which have waited for this pose.
+        ``lost_s``: duration of the gap in s, used if no displacement has waited.
         """
         assert self._frame.pose is not None
         last_stamp_s = self._reckoning.last_stamp_s

@@ -43,8 +43,8 @@ class GapInterpolation:
     ) -> tuple[Pose, Pose]:
         """Return two tangents (twist x time): of all lost displacements, and of ``reading``.
 
-        Both are in body axes. ``heading_rad``: heading before the losses; None if no pose has
-        arrived: ``reading`` is then assumed to be in body axes.
+        Both are in body axes. ``heading_rad``: heading before the losses. None if no pose has
+        arrived; then ``reading`` is assumed to be in body axes.
         """
         last, self.last = self.last, None
         self.missing, self._only_poses = 0, False

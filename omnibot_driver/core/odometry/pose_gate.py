@@ -48,8 +48,8 @@ class PoseGate:
     def displaced(self, reading: DisplacementReading, *, bridges: bool) -> None:
         """Add a reported motion of the robot to ``doubted``, a pose that must still be confirmed.
 
-        ``bridges``: whether to add the displacements lost before, too, each assumed equal to
-        ``reading``. If False, the caller adds them with ``bridged``.
+        ``bridges``: whether to add also the displacements lost just before ``reading``, each
+        assumed equal to ``reading``. If False, the caller adds them with ``bridged``.
         """
         if self.doubted is None:
             return
@@ -97,8 +97,8 @@ class PoseGate:
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
         """Return whether the robot can have reached the pose ``told`` since the last accepted pose.
 
-        False without an accepted pose. ``seconds``: possible time of motion in s, beyond the time
-        recorded with ``passed``. ``mps``, ``radps``: largest speeds.
+        False without an accepted pose. ``seconds``: possible time of motion in s, in addition to
+        the time recorded with ``passed``. ``mps``, ``radps``: largest speeds.
         """
         if self.proved is None:
             return False

@@ -2,9 +2,9 @@
 
 """The robot's motion in the odometry frame: best pose, published pose and uncertainty.
 
-The inputs are tangents (twist x time) that the board reports. They are in the board's axes, and the
-board computes them with assumed wheel sizes. The outputs are in REP-103's axes, with true distances
-and turns. This module does not know which of the board's reports are right.
+The inputs are the motions that the board reports, as twist x time (tangents). They are in the
+board's axes, and based on assumed wheel sizes. The outputs are in REP-103's axes, with true
+distances and turns. This module does not know which of the board's reports are right.
 """
 
 from typing import Final
@@ -86,14 +86,14 @@ class PoseTracker:
     def miss(self, duration_s: float, counted_s: float = 0.0) -> None:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
 
-        ``counted_s``: duration of the first part of this gap, whose uncertainty was added earlier.
+        ``counted_s``: duration of the gap's first part, if its uncertainty was added earlier.
         """
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps, counted_s)
 
     def halt(self, tangent: Pose) -> None:
         """Add the uncertainty that arises because the robot came to rest when its board restarted.
 
-        ``tangent``: mean motion until the robot was at rest.
+        ``tangent``: half of the longest possible motion until the robot was at rest.
         """
         way = _times(tangent, self._size)
         self.uncertainty.halt(way.way_m, way.yaw_rad)

@@ -150,7 +150,7 @@ class OmniBot:
 
     @property
     def figures(self) -> BoardFigures:
-        """Counters over all connections, and the expected rates in Hz."""
+        """Counters of faults over all connections, and the expected rates in Hz."""
         return BoardFigures(
             rates_hz=self._schedule.rates_hz,
             faults=self._statistics.faults,

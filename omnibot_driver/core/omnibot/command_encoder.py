@@ -119,8 +119,8 @@ class CommandEncoder:
     def drive_to(self, pose: Pose) -> bytes:
         """Encode a goal in the board's own frame, for positional control.
 
-        The origin is a goal, too, not Stop. Raises CommandRefused if a value exceeds 16 bits, or if
-        a high byte is a letter (S, P, R).
+        A goal at the origin is not encoded as Stop. Raises CommandRefused if a value exceeds 16
+        bits, or if a high byte is a letter (S, P, R).
         """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)

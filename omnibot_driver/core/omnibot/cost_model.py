@@ -59,12 +59,12 @@ GAP: Final = 5.0
 """Cost of a frame whose bytes arrived with a pause between them: the board does not interrupt a
 frame."""
 BAD_TEXT: Final = 4.0
-"""Cost of a complete «Paused» text within unexplained bytes. The cost is high, because the nine
-fixed bytes of this text hardly arise by chance."""
+"""Cost of leaving a complete «Paused» text unexplained. The cost is high, because the nine fixed
+bytes of this text hardly arise by chance."""
 KNOWN_GAP: Final = 11.0
-"""Cost of a frame that contains a pause, on a line that has paused only between frames so far.
+"""Cost of a frame that contains a pause, if pauses on this line are known to be between frames.
 
-This is also the cost of a frame with a pause of ``late_reads.IDLE_S`` or longer, on any line.
+If the pause lasts ``late_reads.IDLE_S`` or longer, the cost applies to any line.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -174,10 +174,10 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
-        """Limits in counts, as integers for speed. An IMU frame's content within them has no cost.
+        """Limits in counts. An IMU frame's content within these limits has no cost.
 
         In order: least and largest squared acceleration, largest change of an acceleration word and
-        of a gyro word.
+        of a gyro word. Integers make the check faster.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:

@@ -63,8 +63,8 @@ class DecoderStatistics:
 class FrameDecoder:
     """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
-    ``single_imu``, which decodes some frames instead, must update these attributes: ``context``,
-    ``expectation``, ``pauses``, ``last_arrival_s`` and ``statistics``.
+    ``single_imu`` decodes some frames without this class, and must update these attributes:
+    ``context``, ``expectation``, ``pauses``, ``last_arrival_s`` and ``statistics``.
     """
 
     def __init__(

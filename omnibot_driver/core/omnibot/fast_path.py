@@ -58,9 +58,9 @@ class Walk:
     No evidence speaks against these frames.
 
     * ``ends``: the position in the bytes after each frame.
-    * ``lessons``: for ``Expectation.learn``: number of frames before an IMU frame, this frame, and
-      the previous IMU frame.
-    * ``known``: a number of frames, and the fields of the ``Context`` after them.
+    * ``lessons``: tuples for ``Expectation.learn``: number of frames before an IMU frame, this
+      frame, and the previous IMU frame.
+    * ``known``: tuples of a number of frames, and the fields of the ``Context`` after these frames.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -99,8 +99,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
-    If so, a shock caused the content, not damage. ``closed``: whether no more bytes come; the
-    result if ``held`` ends at ``at``.
+    If so, a shock caused the content, not damage. If ``held`` ends at ``at``, the result is
+    ``closed``: whether no more bytes will come.
     """
     if at == len(held):
         return closed

@@ -22,8 +22,9 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    A position is the index of the frame that is due next. ``after[kind][at]``: the position after a
-    frame of ``kind`` arrives at ``at``; the frames due before it count as lost.
+    A position is the index of the frame that is due next. ``after[kind][at]``: the next position if
+    a frame of ``kind`` arrives at the position ``at``. Frames that were due before it count as
+    lost.
     """
 
     def __init__(self, *kinds: Kind) -> None:

@@ -120,7 +120,7 @@ class InterFrameGaps:
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
-        """Learn from accepted frames whether this line's pauses are between frames.
+        """Learn from accepted frames whether the line pauses between frames or within frames.
 
         ``ends``: the end of each accepted frame, as a position among the bytes that the decoder
         holds.

@@ -2,9 +2,9 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-* The line was idle. If a supposed frame contains the pause, bytes were lost: the beginning and the
-  end of the frame come from different ticks. So all later frames seem late by whole ticks.
-* Only the reader was late. The frames after the pause are on time again.
+* Idle line: if a supposed frame contains the pause, bytes were lost. The frames after the pause
+  seem late by whole ticks.
+* Late reader: no bytes were lost. The frames after the pause are on time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
 contains, or which frames are accepted.
@@ -50,18 +50,18 @@ Within this tolerance, the bytes did not wait for the reader.
 FEW_BYTES: Final = 2
 """Largest number of bytes that is too small to measure how fast bytes arrive.
 
-In a frame with a pause, the measurement begins after the first read that follows the pause, and
-ends with the frame.
+The measurement is made in the rest of a supposed frame, after the first read that follows a pause
+in this frame.
 """
 TICKS_TO_PROVE: Final = 2
-"""Number of further late ticks, after a first late tick, that prove that bytes were lost.
+"""Number of late ticks, after a first late tick, that prove that bytes were lost.
 
-All must be equally late, each in a separate read. After a pause of ``IDLE_S`` or more, one further
-tick is enough.
+After a loss, all ticks are equally late. So only equally late ticks count, each in a separate read.
+After a pause of ``IDLE_S`` or more, one further tick is enough.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Largest number of bytes after a frame that are used to find the cause of a pause in this frame.
-Without a proof in these bytes, a late reader is assumed."""
+If these bytes do not prove a loss, a late reader is assumed."""
 
 
 class Cause(Enum):

@@ -2,7 +2,7 @@
 
 """A lower bound for the cost of interpreting the remaining bytes, found from headers alone.
 
-The headers show the least number of damaged frames.
+Bytes without headers cost at least as much as the fewest damaged frames that can cover them.
 
 Input: bytes. Output: for each position in the bytes, the least possible cost of all bytes after it.
 This module does not know the search (``trellis``), which uses the bound.
@@ -23,7 +23,7 @@ The longest frame has 15 bytes, and damage on the line can add 2.
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""Costs of the last 15, 14, ... 1 bytes of a run of unexplained bytes (a bad run).
+"""Costs of the rest of a run of unexplained bytes (a bad run), if 15, 14, ... 1 bytes are left.
 
 The cost of 15 bytes is a little below ``DAMAGE``, the cost of a damaged frame.
 """

@@ -79,8 +79,8 @@ class MisconfigurationChecks:
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
         """Check the configured period of the deltas with a new delta.
 
-        ``imus``: number of IMU frames since the previous delta, which shows the period. ``now``:
-        arrival time of the new delta in s.
+        ``imus``: number of IMU frames since the previous delta; this number shows the period.
+        ``now``: arrival time of the new delta in s.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:

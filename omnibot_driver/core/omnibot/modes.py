@@ -82,7 +82,7 @@ class ModeTracker:
     def hear_imus(self, count: int) -> None:
         """Update the mode after a row of IMU frames without a delta between them.
 
-        ``count``: number of these frames, at most ``imus_to_come``.
+        ``count``: number of these frames. It must not exceed ``imus_to_come``.
         """
         self.imus_to_come -= count
         if not self.imus_to_come:

@@ -34,8 +34,8 @@ ZEROS: Final = bytes(8)
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-The zeros may complete a damaged previous frame to a wrong command. The fewer zeros, the sooner the
-motion frame replaces this command.
+The zeros may complete a damaged previous frame to a wrong command. The motion frame then replaces
+the wrong command. With few zeros, this happens soon.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET
