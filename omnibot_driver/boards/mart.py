@@ -60,10 +60,10 @@ PARAMETERS: Final = table(
             " leave it at 1, because `calibrate scale` corrects distances with metres_per_count."
         },
         "odom_angular_scale": {
-            "description": "Ratio of the true angle of a turn to its angle in odom after the stop,"
-            " measured with this parameter at 1. The driver multiplies the angles of the"
-            " controller's gyro by this ratio. While the robot turns on the spot, odom uses the"
-            " right wheel, not the gyro. The parameter track corrects the right wheel's angle."
+            "description": "Correction of the controller's gyro: the driver multiplies its angles"
+            " by this ratio. To find the ratio, set it to 1, stop after a turn, and divide the true"
+            " angle by the angle in odom. While the robot turns on the spot, odom uses the right"
+            " wheel instead, which the parameter track corrects."
         },
         "port": {
             "default": "udp://192.168.1.50:5000",

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulated boards on pseudo-terminals that send the stream of nominal mode and record commands.
+"""Simulated boards on pseudo-terminals. They send a stream as in nominal mode, and store commands.
 
-The boards take turns within each tick. The first word of an IMU frame is the frame's number.
+The boards send one after the other in each tick. The first word of an IMU frame is its number.
 """
 
 import heapq

@@ -44,11 +44,10 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return the driver's writes if the board reports ``shown`` from ``tick`` on.
+        """Return the course in which the board reports ``shown`` from ``tick`` on.
 
-        Before ``tick``, the board reports the states of this course.
-
-        ``shown``: the mode of the board, and whether the robot moves.
+        Before ``tick``, it equals this course. ``shown``: the mode of the board, and whether the
+        robot moves.
         """
         other = self._others.get((tick, shown))
         if other is None:

@@ -35,8 +35,8 @@ The clock begins anew if at least ``AGAIN`` implausible board times in a row agr
 EARLIES_WITHIN_S: Final = 1.0
 """Limit, in s, for the time from the first to the last of three lines that seem early.
 
-If their board times agree, a late line began the clock, so that later lines seem early. The clock
-then begins anew.
+If the board times of the three lines agree, the clock was begun with a late line. The clock then
+begins anew.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""

@@ -42,9 +42,9 @@ NO_TICKS_ADVICE: Final = (
     "the board sends other reports, but no ticks, so there is no odometry, and a stop cannot be"
     " confirmed; set `ticks_period`"
 )
-"""Advice if other reports came for ``NO_TICKS_S`` (in s), but no ticks.
+"""Advice after ``NO_TICKS_S`` (in s) with other reports, but without ticks.
 
-A pause between two reports adds at most ``LONGEST_STEP_S`` (in s) to this time.
+Of each pause between two reports, at most ``LONGEST_STEP_S`` (in s) counts.
 """
 LOOK_AT: Final = 600
 """Number of received bytes without a valid line after which the user gets advice. The board sends

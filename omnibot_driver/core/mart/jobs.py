@@ -155,14 +155,14 @@ class Jobs:
             )
         if job is Job.LOG_FILE and not self.logging:
             raise RequestRefused(
-                "no log was started: call ~/start_log first. Otherwise ~/download_log ends the"
-                " server, which then sends no file"
+                "no log was started: call ~/start_log first. Without a log, ~/download_log would"
+                " only end the server"
             )
         if job is Job.LOG_FILE and self.log_may_be_lost:
             raise RequestRefused(
-                "the server may have been restarted and may no longer keep a log. Then"
-                " ~/download_log would end the server, which sends no file. Copy the old log from"
-                " the controller, or call ~/start_log to delete the old log and begin a new one"
+                "the server may have been restarted and may no longer keep a log. Without a log,"
+                " ~/download_log would only end the server. Copy the old log from the controller,"
+                " or call ~/start_log to delete the old log and begin a new one"
             )
         self.job, self._token, self.turn_record = job, token, None
         self._request = WORD_OF[job].request(*arguments)

@@ -81,8 +81,8 @@ class Measuring(Starts):
         if self.state is State.DRIVING and not abs(math.radians(degrees)) < MOST_RAD:
             self._halt(
                 now,
-                "the server computes the relative heading with the controller's clock, and this"
-                " clock was set; the driver begins the drive again",
+                "somebody set the controller's clock, which makes the server's headings wrong; the"
+                " driver begins the drive again",
             )
         return changed
 

@@ -103,9 +103,9 @@ class Starts(ImuChecks):
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _switch_motors_off(self, now: float) -> Packets:
-        """Return the next request that switches off the motors; no packets while it must wait.
+        """Return the next request of a switch-off; no packets while this request must wait.
 
-        MCS stops both motors; MSM ends the effect of MCS.
+        MCS switches both motors off. Then MSM ends this direct control, so that moves work again.
         """
         request = self._switch_off.next()
         # before this time, a late reply could be mistaken for the reply to this request

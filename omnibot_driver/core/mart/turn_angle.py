@@ -19,8 +19,9 @@ NO_CORRECTION: Final = 0.0
 class TurnAngle:
     """The angle of the current turn on the spot, or of the last one.
 
-    ``spun_rad``: the turn that the wheel has measured, or the recorded angle that ``record`` has
-    accepted. The methods return corrections in rad, which the caller adds to the heading.
+    ``spun_rad``: the angle by the right wheel's encoder. If ``record`` accepts the angle in the
+    server's file of the turn, this angle replaces it. The methods return corrections in rad, which
+    the caller adds to the heading.
     """
 
     def __init__(self) -> None:

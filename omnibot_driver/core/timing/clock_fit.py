@@ -27,10 +27,10 @@ LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm plus a margin
 of 20 ppm."""
 SUPPORT: Final = 0.75
-"""Selects the edge of the upper bounds' convex hull that serves as the fitted clock.
+"""Position, from 0 (oldest) to 1 (newest), among the arrival times in use. The edge of their lower
+convex hull at this position becomes the fitted clock, if there are no lower bounds.
 
-The hull is used if the fit uses no lower bounds. A larger value (0 to 1) selects a later edge,
-which follows recent points more closely, with more jitter.
+With a larger value, the clock follows recent arrival times more closely, with more jitter.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the

@@ -41,9 +41,10 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Check a line. Return the result, the line without ``;NN``, and the correct checksum.
+    """Check the checksum ``;NN`` at the beginning of a line.
 
-    The returned checksum is 0 if the line has no ``;NN``.
+    Return three values: the result of the check, the rest of the line, and the correct checksum (0
+    if the line has no ``;NN``).
     """
     found = _PREFIX.match(text)
     if found is None:

@@ -80,10 +80,10 @@ def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_boa
 def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """A board that sends no poses is paused. Then a delta with the count n arrives.
+    """A board that sends no poses is paused. Then a delta with another count arrives.
 
-    If the board has restarted, n deltas are lost, and otherwise m deltas. The driver suspects a
-    restart only if n is at most m.
+    The driver suspects a restart only if a restart means at most as many lost deltas as a
+    continued count.
     """
     sequence = begun(count)
     sequence.pause()

@@ -250,9 +250,9 @@ def record_waits_for_one_more(quirks: Quirks) -> bool:
 
 
 def large_records_never_end(quirks: Quirks) -> bool:
-    """Return whether a record of the times of 1025 ticks never comes.
+    """Return whether the board never sends a record of 1025 ticks.
 
-    Both wheels turn by more than 1025 ticks, at 120 ticks per turn.
+    The host requests the record, and both wheels turn by more than 1025 ticks.
     """
     rig = Rig(quirks, steps=120)
     rig.run(2.1)
