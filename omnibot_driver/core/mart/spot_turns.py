@@ -96,7 +96,7 @@ class SpotTurns:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the controller makes all turns at its own speed SLOW, not at the commanded speed."""
+        """Whether all turns have the controller's own speed SLOW, not the commanded speed."""
         return self._refused or self.settings.spin_speed == "fixed"
 
     def request(self, rate_radps: float) -> Request:

@@ -241,8 +241,8 @@ class Diagnosis:
         elif too_large:
             level = Level.WARN
             message = (
-                "commanded speeds are larger than a command to the board can hold; lower the"
-                " parameters for scales or speed limits"
+                "commanded speeds are larger than a command to the board can hold; lower the scales"
+                " or the speed limits"
             )
         elif commands.source is None:
             message = "idle"
