@@ -81,7 +81,7 @@ class Measuring(Starts):
         if self.state is State.DRIVING and not abs(math.radians(degrees)) < MOST_RAD:
             self._halt(
                 now,
-                "somebody set the controller's clock, which makes the server's headings wrong; the"
+                "the controller's clock was set, which makes the server's headings wrong; the"
                 " driver begins the drive again",
             )
         return changed

@@ -36,7 +36,7 @@ STUCK: Final = (
 )
 HALF_STUCK: Final = (
     "one wheel does not turn: check its motor, wiring and power; forward motion is refused until"
-    " you end the command or send a zero command"
+    " the command is zero or expires"
 )
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
 """Limits in m/s and rad/s. A robot whose measured speed or turn rate exceeds one of them certainly
